@@ -23,7 +23,7 @@ What PROGRAM makes of each is left in OUT_DIR/captures, with what it says. One r
 A point of a node is put to the branch that is seen where and when the point was found, as in films_told.py, but in all frames
 before the camera was moved. Between right and wrong lie answers that are as uncertain as they say, and those of another branch
 beside the node's. A good film has some of these and, at times, a wrong one: a film fails that has more
-wrong ones than the clean film of the same tree.
+wrong ones than the clean film of the same tree; one of which only a short part counts, than that part of the clean film.
 
 Exit status: 0 all as expected, 1 not. Needs what made_films.py needs.
 """
@@ -56,13 +56,16 @@ class Case:
     exits: tuple = (0,)
     grades: tuple = ("good", "fair", "poor")
     names: tuple = ()  # each is found in the verdict
-    never: tuple = ()  # none is
+    never: tuple = ("film cut",)  # none is
     warns: str = ""  # is found in what PROGRAM says
+    twin: str = ""  # the case without what is bad in this one; the clean one where it is not said
 
 
 NO_TREE = dict(sways=False, exits=(1,), grades=("poor",), names=("no tree found",))
 MOVED = dict(exits=(0,), grades=("fair", "poor"), names=(r"camera moved at \d",), warns="turned, zoomed, refocused or covered")
-STEADY = ("camera moved", "shakes", "nothing around the tree")
+STILL = ("camera moved", "shakes", "nothing around the tree")
+STEADY = STILL + ("film cut",)
+CUT = dict(grades=("fair", "poor"), never=STILL, warns="the film is cut, or its picture stands still")
 CHANGE_S = {"release": bad_camera.CHANGE_SHARE * RELEASE_S, "wind": bad_camera.CHANGE_SHARE * WIND_S}
 CASES = {
     "clean": Case(grades=("good", "fair"), never=STEADY),
@@ -118,7 +121,11 @@ CASES = {
     "only_hand": Case(("calm", "hand_held"), **NO_TREE),
     "only_hand_auto": Case(("calm", "hand_held"), outline=False, **NO_TREE),
     # Edited films.
-    "jump_cut": Case(edit="jump_cut", known_s=edits.CUT_S[0]),
+    "jump_cut": Case(edit="jump_cut", known_s=edits.CUT_S[0], names=(f"film cut or stalled at {edits.CUT_S[0]} s",), twin="short", **CUT),
+    "jump_cut_wind": Case(edit="jump_cut", mode="wind", known_s=edits.CUT_S[0],
+                          names=(f"film cut or stalled at {edits.CUT_S[0]} s",), **CUT),
+    "stalled": Case(edit="stalled", known_s=edits.STALL_S[0], names=(f"film cut or stalled at {edits.STALL_S[0]} s",), twin="short", **CUT),
+    "short": Case(edit="shortened", twin="short", grades=("fair", "poor"), names=("s filmed",), never=STEADY),
     "joined": Case(edit="joined", known_s=edits.JOINED_S, grades=("fair", "poor"), names=(r"camera moved at \d",)),
     "variable_rate": Case(edit="variable_rate", grades=("good", "fair"), never=STEADY),
     "variable_rate_wind": Case(edit="variable_rate", mode="wind", grades=("good", "fair"), never=STEADY),
@@ -190,11 +197,10 @@ def run(program, out_dir, seeds, names):
     for name in names:
         for seed in seeds:
             case, result = CASES[name], replay(program, out_dir, name, seed)
-            if case.mode not in clean.setdefault(seed, {}):
-                is_clean = name == CLEAN[case.mode]
-                twin = result if is_clean or not case.sways else replay(program, out_dir, CLEAN[case.mode], seed)
-                clean[seed][case.mode] = len(twin.wrong())
-            failures = result.failures(case, clean[seed][case.mode] if case.sways else 0)
+            twin = case.twin or CLEAN[case.mode]
+            if case.sways and (twin, seed) not in clean:
+                clean[twin, seed] = len((result if name == twin else replay(program, out_dir, twin, seed)).wrong())
+            failures = result.failures(case, clean[twin, seed] if case.sways else 0)
             failed += bool(failures)
             counts = [len(result.answers), sum(a.is_right for a in result.answers), len(result.wrong())]
             print(f"{f'{name} {seed}':<27}{result.exit_status:4} {counts[0]:7} {counts[1]:5} {counts[2]:5}"

@@ -280,6 +280,59 @@ fn an_update_judges_anew() {
     assert_eq!(note(&dir), old);
 }
 
+/// A table of points without a second of film from 4 s on, after which the times run on.
+fn without_a_second(text: &str) -> String {
+    let mut out = String::new();
+    for line in text.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        // The header has none.
+        if let Ok(time_s) = cells[2].parse::<f64>() {
+            if (4.0..5.0).contains(&time_s) {
+                continue;
+            }
+            if time_s >= 5.0 {
+                cells[2] = format!("{:.6}", time_s - 1.0);
+            }
+        }
+        out += &(cells.join(",") + "\n");
+    }
+    out
+}
+
+/// Phases do not join across a cut: what is fitted across it is no tree's.
+#[test]
+fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
+    let (_dir, dir) = captured("tree");
+    change_points(&dir, without_a_second);
+    let cut = analyze(&[&dir], &["--json", "--update"]);
+    let said = String::from_utf8_lossy(&cut.stderr).into_owned();
+    assert!(
+        cut.status.success()
+            && said.contains("the film is cut, or its picture stands still, at 4.0 s"),
+        "{said}"
+    );
+    let found: Value = serde_json::from_slice(&cut.stdout).expect("JSON");
+    let capture = &found["captures"][0];
+    let ends_s = [&capture["from_s"], &capture["to_s"]].map(number);
+    assert!(ends_s[0] > 3.9 || ends_s[1] < 4.1, "{ends_s:?}");
+    let note = note(&dir);
+    let reasons = note["verdict"]["reasons"].to_string();
+    assert!(
+        reasons.contains("film cut or stalled at 4.0 s"),
+        "{reasons}"
+    );
+    assert!((number(&note["judged_by"]["cut_at_s"]) - 4.0).abs() < 0.05);
+    // A part that the user chooses is in one piece; of the film it stays known.
+    let part = analyze(&[&dir], &["--to", "3.9", "--update"]);
+    let said = String::from_utf8_lossy(&part.stderr).into_owned();
+    assert!(part.status.success() && !said.contains("cut"), "{said}");
+    assert!(
+        self::note(&dir)["verdict"]["reasons"]
+            .to_string()
+            .contains("film cut")
+    );
+}
+
 #[test]
 fn the_part_of_the_film_and_its_cause_can_be_chosen() {
     let (_dir, dir) = captured("tree");
@@ -1340,31 +1393,32 @@ fn lasts(dir: &Path, seconds: u32) {
 #[test]
 fn of_a_long_film_the_end_is_looked_at_as_the_capture_did() {
     let (_dir, dir) = captured("long");
-    prolong(&dir, 7, 11.0);
-    lasts(&dir, 77);
+    // Half a second is missing between two laps: a gap is no cut.
+    prolong(&dir, 7, 11.5);
+    lasts(&dir, 80);
     let part = |more: &[&str]| {
         let told = told(&[&dir], &[&["--excitation", "release"], more].concat());
         let capture = &told["captures"][0];
         let noted = capture["notes"]
             .to_string()
-            .contains("of 77 s of film the last 60 (dynamics.window_s)");
+            .contains("of 80 s of film the last 60 (dynamics.window_s)");
         (
             [number(&capture["from_s"]), number(&capture["to_s"])].map(f64::round),
             noted,
         )
     };
-    assert_eq!(part(&[]), ([17.0, 77.0], true));
-    assert_eq!(part(&["--from", "0"]), ([0.0, 77.0], false));
+    assert_eq!(part(&[]), ([20.0, 80.0], true));
+    assert_eq!(part(&["--from", "0"]), ([0.0, 80.0], false));
     assert_eq!(part(&["--to", "66"]), ([0.0, 66.0], false));
     let settings = dir.with_file_name("window.toml");
     fs::write(&settings, "[dynamics]\nwindow_s = 300\n").expect("file");
     assert_eq!(
         part(&["--config", &settings.display().to_string()]),
-        ([0.0, 77.0], false)
+        ([0.0, 80.0], false)
     );
     let output = analyze(&[&dir], &["--excitation", "release"]);
     let text = String::from_utf8_lossy(&output.stdout);
-    assert!(text.contains(" to 77.0 s of the film"), "{text}");
+    assert!(text.contains(" to 80.0 s of the film"), "{text}");
 }
 
 #[test]

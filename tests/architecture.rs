@@ -201,6 +201,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "dynamics::analyse",
             "dynamics::Depth",
             "dynamics::Film",
+            "dynamics::Take",
             // A drawn shape is read, and what it cut is told.
             "shape::Cut",
             "shape::Drawn",

@@ -10,7 +10,7 @@ use super::stop::Stop;
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, Excited};
 use crate::document::{Document, DocumentError};
-use crate::dynamics::{Depth, Film, analyse};
+use crate::dynamics::{Depth, Film, Take, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
 use crate::model::{Excitation, Pose, Skeleton, Swaying, TreeMode};
@@ -32,10 +32,17 @@ const MAX_PART_S: f64 = 600.0;
 /// The analysis of one capture.
 struct CaptureAnalysis {
     study: Study,
-    /// The results for its tables, by node index.
+    found: Found,
+}
+
+/// The results for the tables of a capture.
+struct Found {
+    /// By node index.
     sway: Vec<Swaying>,
     /// Those of the whole tree.
     modes: Vec<TreeMode>,
+    /// Where its film is cut, s.
+    cut_at_s: Option<f64>,
 }
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
@@ -50,7 +57,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     for (document, name) in documents.iter().zip(&names) {
         let analysis = analyse_capture(args, document, name)?;
         studies.push(analysis.study);
-        results.push((analysis.sway, analysis.modes));
+        results.push(analysis.found);
     }
     let comparison = compare(&studies, args.trees.same());
     if let Some(warning) = comparison.as_ref().and_then(|c| warning(args, c)) {
@@ -60,8 +67,12 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     let stop = stop.while_writing();
     let mut failures = Vec::new();
     if args.update {
-        for (dir, (sway, modes)) in args.dirs.iter().zip(&results) {
-            let found = SwayFound { sway, modes };
+        for (dir, found) in args.dirs.iter().zip(&results) {
+            let found = SwayFound {
+                sway: &found.sway,
+                modes: &found.modes,
+                cut_at_s: found.cut_at_s,
+            };
             failures.extend(update(dir, found, stop).err().map(CommandError::from));
         }
     }
@@ -154,7 +165,10 @@ struct Notes<'a> {
 impl Notes<'_> {
     fn add(&mut self, kind: &str, what: String) {
         eprint_line(&format!("arborcam: {kind}: {}: {what}", self.name));
-        self.all.push(what);
+        // A capture may have said so before.
+        if !self.all.contains(&what) {
+            self.all.push(what);
+        }
     }
 }
 
@@ -172,7 +186,11 @@ fn analyse_capture(
     for warning in &document.warnings {
         notes.add("warning", warning.clone());
     }
-    let film = film(args, document, &config, &mut notes)?;
+    let take = Take::of(film(args, document, &config, &mut notes)?);
+    if let Some(warning) = take.warning() {
+        notes.add("warning", warning);
+    }
+    let film = &take.film;
     // Copies have no measured points.
     let skeleton = Skeleton {
         nodes: document.skeleton.nodes[..document.skeleton.measured()].to_vec(),
@@ -181,17 +199,17 @@ fn analyse_capture(
     let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
     let analysis = analyse(
         &skeleton,
-        &film,
+        film,
         &config.dynamics,
         Depth::Full,
         &CancelToken::new(),
     );
     drop(progress);
     let is_excitation_given = config.dynamics.excitation != Excited::Auto;
-    for hint in hints(&film, &analysis, is_excitation_given) {
+    for hint in hints(film, &analysis, is_excitation_given) {
         notes.add("note", hint);
     }
-    let poses = poses_for_plots(document, &film, skeleton.nodes.len(), &mut notes);
+    let poses = poses_for_plots(document, film, skeleton.nodes.len(), &mut notes);
     let picture = document.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
     let outline = document.note.outline.iter();
@@ -199,7 +217,9 @@ fn analyse_capture(
         .flat_map(|o| &o.polygon_px)
         .map(|p| Point2::from(*p))
         .collect();
-    let renewed = document.note.judgement_with(&skeleton, &analysis.sway);
+    let cut_at_s = take.first_cut_s();
+    let note = &document.note;
+    let renewed = note.judgement_with(&skeleton, &analysis.sway, cut_at_s);
     let renewed = renewed.filter(|_| args.update).map(|j| j.verdict);
     let study = Study::of(&Given {
         name,
@@ -207,7 +227,7 @@ fn analyse_capture(
         origin: &document.note.origin(),
         verdict: renewed.as_ref().or(document.note.verdict.as_ref()),
         skeleton: &skeleton,
-        film: &film,
+        film,
         poses: &poses,
         analysis: &analysis,
         excitation: excitation(config.dynamics.excitation),
@@ -218,8 +238,11 @@ fn analyse_capture(
         notes: &notes.all,
     });
     Ok(CaptureAnalysis {
-        modes: analysis.modes,
-        sway: with_amplitudes(&skeleton, analysis.sway, &study),
+        found: Found {
+            modes: analysis.modes,
+            sway: with_amplitudes(&skeleton, analysis.sway, &study),
+            cut_at_s,
+        },
         study,
     })
 }

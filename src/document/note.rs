@@ -308,12 +308,19 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
-    /// What the capture is worth by other answers on its sway, by node index; `None` where it is
-    /// not known what it was judged by.
-    pub fn judgement_with(&self, skeleton: &Skeleton, sway: &[Swaying]) -> Option<Judgement> {
+    /// What the capture is worth by other answers on its sway, by node index, in a film that is cut
+    /// at `cut_at_s`; `None` where it is not known what it was judged by.
+    pub fn judgement_with(
+        &self,
+        skeleton: &Skeleton,
+        sway: &[Swaying],
+        cut_at_s: Option<f64>,
+    ) -> Option<Judgement> {
         let facts = self.judged_by.clone()?;
         Some(Judgement::of(CaptureFacts {
             sway: SwayFacts::of(skeleton, sway),
+            // Of a part of the film it is not known whether another one is cut.
+            cut_at_s: facts.cut_at_s.or(cut_at_s),
             ..facts
         }))
     }

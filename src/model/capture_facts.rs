@@ -78,6 +78,9 @@ pub struct CaptureFacts {
     /// Since when the camera looks elsewhere, s since the first frame; `None` where it does not, or
     /// where that is not known.
     pub camera_moved_at_s: Option<f64>,
+    /// Where a piece of the film is missing, or its picture stands still, while its times run on, s
+    /// since the first frame; `None` where the film is in one piece, or that is not known.
+    pub cut_at_s: Option<f64>,
 }
 
 /// How the points were followed.
@@ -142,6 +145,7 @@ impl CaptureFacts {
     pub(super) fn findings(&self) -> Vec<Finding> {
         let found = [
             self.camera_moved(),
+            self.is_cut(),
             self.shakes(),
             self.hides_shake(),
             self.is_dark(),
@@ -182,6 +186,15 @@ impl CaptureFacts {
             grade: Grade::Fair,
             reason: format!("camera moved at {at_s:.1} s"),
             advice: "fix the camera and film again".into(),
+        })
+    }
+
+    fn is_cut(&self) -> Option<Finding> {
+        let at_s = self.cut_at_s?;
+        Some(Finding {
+            grade: Grade::Fair,
+            reason: format!("film cut or stalled at {at_s:.1} s"),
+            advice: "film again in one piece".into(),
         })
     }
 

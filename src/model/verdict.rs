@@ -161,6 +161,7 @@ mod tests {
             shake: None,
             is_camera_unknown: false,
             camera_moved_at_s: None,
+            cut_at_s: None,
         }
     }
 
@@ -282,6 +283,12 @@ mod tests {
             |f| (f.camera_moved_at_s, f.brightness) = (Some(12.34), Some(30.0)),
             "fair, because: camera moved at 12.3 s; too dark. To do: fix the camera and film \
              again; film with more light",
+        );
+        check(
+            "two seconds are cut out",
+            |f| (f.cut_at_s, f.filmed_s) = (Some(5.04), 12.0),
+            "fair, because: film cut or stalled at 5.0 s; 12 of 20 s filmed. To do: film again in \
+             one piece; film 8 s more",
         );
     }
 

@@ -4,7 +4,7 @@ use super::angles::AngleWindow;
 use super::back::{BackEnd, Moved};
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{Depth, Film, analyse, spectrum};
+use crate::dynamics::{Depth, Film, Take, analyse, spectrum};
 use crate::model::{
     AngleSpectrum, Angles, BranchSway, ModeSummary, NodeId, NodeName, Skeleton, SwayNow, TrackId,
     TrackLog, participation,
@@ -109,6 +109,7 @@ impl SwayJob {
     pub fn run(&self, cancel: &CancelToken) -> SwayNow {
         let window = self.log.last(self.settings.window_s);
         let film = Film::from_log(window, &self.skeleton, |id| self.nodes.get(&id).copied());
+        let film = Take::of(film).film;
         let analysis = analyse(&self.skeleton, &film, &self.settings, Depth::Quick, cancel);
         let mut branches = BTreeMap::new();
         let botanical = self.skeleton.botanical_branches();

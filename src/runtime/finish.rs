@@ -15,7 +15,7 @@ use crate::document::{
     BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE,
     REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
 };
-use crate::dynamics::{Depth, Film};
+use crate::dynamics::{Depth, Film, Take};
 use crate::files::OutputFolder;
 use crate::model::{
     AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog,
@@ -182,22 +182,26 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     tables.catch_up(&job.tracks, cancel)?;
     let mut done = tables.finish(&job.tracks, cancel)?;
     let model = done.replay.model().clone();
-    let film = film(job, &done);
+    let take = take(job, &done);
     let poses = std::mem::take(&mut done.poses);
     // Most of the document needs no sway, and the user who has asked for the end is waiting.
     let cancel = &job.shared.pulse.closing_work;
     let (model, writer) = beside(
         "sway",
-        || with_modes(&model, &film, &job.config, Depth::Full, cancel),
+        || with_modes(&model, &take.film, &job.config, Depth::Full, cancel),
         || draft(job, &done, poses),
     );
     warn_of_unanalysed(job, &model);
+    if let Some(warning) = take.warning() {
+        job.shared.warn(warning);
+    }
     let warnings = warnings(job, Some(&model));
-    let judgement = judge(job, Some(&model));
+    let judgement = judge(job, Some(&model), &take);
     let verdict = judgement.verdict.clone();
     let found = SwayFound {
         sway: &model.modes,
         modes: &model.tree_modes,
+        cut_at_s: take.first_cut_s(),
     };
     writer?.write(&done.folder, found, warnings, Some(judgement))?;
     let dir = done.folder.publish()?;
@@ -208,13 +212,15 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     })
 }
 
-/// The points of the last seconds on the nodes of the tree.
-fn film(job: &CaptureJob, done: &Done) -> Film {
+/// The points of the last seconds on the nodes of the tree, as far as they are in one piece.
+fn take(job: &CaptureJob, done: &Done) -> Take {
     let mut log = job.log.clone();
     log.close();
     let skeleton = &done.replay.model().skeleton;
     let window = log.last(job.config.dynamics.window_s);
-    Film::from_log(window, skeleton, |id| done.replay.node_of(id))
+    Take::of(Film::from_log(window, skeleton, |id| {
+        done.replay.node_of(id)
+    }))
 }
 
 /// The document but for its sway.
@@ -296,7 +302,7 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     });
     nodes(folder.file("nodes.csv")?, &foot_only, &[], metres_per_px)?;
     MotionCsv::new(folder.file("motion.csv")?, &foot_only, metres_per_px)?.finish()?;
-    let judgement = judge(job, None);
+    let judgement = judge(job, None, &Take::default());
     let verdict = judgement.verdict.clone();
     let mut note = describe(job, None, None);
     note.take_judgement(judgement);

@@ -2,6 +2,7 @@
 
 use super::finish::{CaptureJob, Quality, timing};
 use crate::config::Dynamics;
+use crate::dynamics::Take;
 use crate::model::{CaptureFacts, FootBasis, Judgement, Picture, PointFacts, SwayFacts, TrackLog};
 use crate::signal::statistics::quantile;
 use crate::solve::Model;
@@ -23,6 +24,10 @@ pub struct JudgedFilm<'a> {
     /// `None` without a tree.
     pub foot: Option<FootBasis>,
     pub sway: Option<SwayFacts>,
+    /// Where the film is cut, s; `None` where it is in one piece, or that is not known yet.
+    pub cut_at_s: Option<f64>,
+    /// What is left out of it as it is cut, s.
+    pub left_out_s: f64,
 }
 
 /// How long it is.
@@ -42,7 +47,7 @@ impl JudgedFilm<'_> {
         CaptureFacts {
             is_filming: self.is_filming,
             amplitude_px: quantile(amplitudes_px, QUIETER),
-            filmed_s: self.length.seconds * (1.0 - shaking.lost_share),
+            filmed_s: self.length.seconds * (1.0 - shaking.lost_share) - self.left_out_s,
             rate_hz: self.length.rate_hz,
             highest_hz: self.settings.highest_hz,
             points: PointFacts {
@@ -56,12 +61,14 @@ impl JudgedFilm<'_> {
             shake: shaking.shake,
             is_camera_unknown: !shaking.is_known(),
             camera_moved_at_s: shaking.lost_since_s,
+            cut_at_s: self.cut_at_s,
         }
     }
 }
 
-/// What a capture is worth whose tree is `tree`, with its sway where that was analysed.
-pub fn judge(job: &CaptureJob, tree: Option<&Model>) -> Judgement {
+/// What a capture is worth whose tree is `tree`, with its sway where that was analysed, which is
+/// that of `take`.
+pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
     let timing = timing(job);
     let film = JudgedFilm {
         is_filming: false,
@@ -75,6 +82,8 @@ pub fn judge(job: &CaptureJob, tree: Option<&Model>) -> Judgement {
         brightness: job.picture.as_ref().and_then(mean_grey),
         foot: tree.map(|tree| tree.foot.basis),
         sway: tree.and_then(|tree| SwayFacts::of(&tree.skeleton, &tree.modes)),
+        cut_at_s: take.first_cut_s(),
+        left_out_s: take.left_out_s,
     };
     Judgement::of(film.facts())
 }

@@ -21,6 +21,7 @@ use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
 use crate::cancel::CancelToken;
 use crate::config::Config;
+use crate::dynamics::Take;
 use crate::model::{CaptureFacts, Phase, Picture, Pose, SwayNow, Verdict};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
@@ -549,7 +550,7 @@ impl ModelThread {
             return None;
         }
         let tree = job.tree.as_deref();
-        let judged = judge(&job, tree).facts;
+        let judged = judge(&job, tree, &Take::default()).facts;
         let sway = tree.and_then(|tree| self.verdict.sway_facts(tree));
         Some(Verdict::of(&CaptureFacts { sway, ..judged }))
     }

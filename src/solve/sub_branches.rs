@@ -7,7 +7,7 @@
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::dynamics::{Film, FilmTrack, NOT_SEEN, shoots};
+use crate::dynamics::{Film, FilmTrack, NOT_SEEN, Take, shoots};
 use crate::hierarchy::rest_position_px;
 use crate::model::{Node, NodeId, NodeKind, NodeName, Skeleton, TrackId, TrackTable};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
@@ -60,7 +60,7 @@ pub(super) fn identify(
             at_px: table.positions[row].iter().map(place_px).collect(),
         });
     }
-    let film = Film::new(&table.times_s, tracks);
+    let film = Take::of(Film::new(&table.times_s, tracks)).film;
     let found = shoots(skeleton, &film, config, cancel);
     let mut out = Vec::new();
     for on in (0..skeleton.measured() as u32).map(NodeId) {

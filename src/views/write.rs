@@ -42,6 +42,8 @@ pub struct SwayFound<'a> {
     pub sway: &'a [Swaying],
     /// Those of the whole tree, the slowest first.
     pub modes: &'a [TreeMode],
+    /// Where the film is cut, s; `None` where it is in one piece, or that is not known.
+    pub cut_at_s: Option<f64>,
 }
 
 /// A document on its way to the disk.
@@ -133,7 +135,11 @@ impl DocumentWriter {
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
     let warnings = draft.note.warnings.clone();
-    let found = SwayFound { sway, modes: &[] };
+    let found = SwayFound {
+        sway,
+        modes: &[],
+        cut_at_s: None,
+    };
     DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
     Ok(folder.publish()?)
 }
@@ -157,7 +163,7 @@ pub fn update(dir: &Path, found: SwayFound, stop: &AtomicBool) -> Result<(), Pre
         put(&dir.join(MODEL_FILE), &model, stop)?;
     }
     let Document { note, skeleton, .. } = &mut tree.document;
-    if let Some(judgement) = note.judgement_with(skeleton, found.sway) {
+    if let Some(judgement) = note.judgement_with(skeleton, found.sway, found.cut_at_s) {
         note.take_judgement(judgement);
         put(&dir.join(NOTE_FILE), &json(note)?, stop)?;
     }
