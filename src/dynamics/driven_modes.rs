@@ -19,7 +19,7 @@ pub(super) const MOTIONS: usize = 6;
 /// Power of gusts falls with frequency by this exponent (Kolmogorov 1941).
 const GUST_EXPONENT: f64 = -5.0 / 3.0;
 /// Of Schwarz's penalty this share is asked of a mode: modes near each other would be one by all of
-/// it. Found on made films (docs/dynamics.md).
+/// it. Found on made films (docs/design/sway.md).
 const PENALTY_SHARE: f64 = 0.5;
 /// Power of the noise that the search begins with, as a share of the mean of the motions.
 const FIRST_NOISE: f64 = 0.01;

@@ -50,7 +50,7 @@ const MIN_POINTS_OF_PART: usize = 3;
 const PART_FREQ_TOLERANCE: f64 = 0.003;
 const PART_FREQ_SIGMAS: f64 = 4.0;
 /// And they are moved as by one swing ([`Arms::one_swing`]), which points of several branches that
-/// are alike in frequency are not. Found on clips of our own (docs/dynamics.md).
+/// are alike in frequency are not. Found on clips of our own (docs/design/sway.md).
 const MIN_COLLINEARITY: f64 = 0.95;
 /// A mode that is no farther from a doubted one than this share is that one.
 const DOUBT_FREQ_TOLERANCE: f64 = 0.01;

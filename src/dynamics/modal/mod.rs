@@ -43,7 +43,7 @@ const MIN_SHARE_OF_BRANCH: f64 = 0.75;
 /// one branch at a time needs (free_decay.rs): these frequencies are known less well.
 const CARRIER_FREQ_TOLERANCE: f64 = 0.012;
 /// Intervals are so much wider than the curvature says, and no narrower than these standard
-/// deviations. Found on clips of our own (docs/dynamics.md).
+/// deviations. Found on clips of our own (docs/design/sway.md).
 const CI_INFLATION: f64 = 2.0;
 const MIN_LN_SD: LnDeviations = LnDeviations {
     frequency: 0.003,
