@@ -1,28 +1,32 @@
 //! Modes that wind drives in a branch and what carries it.
+//!
+//! They are looked for in several rounds, each with covariances up to a lag of its own and with bands
+//! in places of their own: what all rounds find does not hang on where the search began.
 
 use super::branch_tree::BranchTree;
 use super::branches::LnDeviations;
 use super::decay::Mode;
-use super::driven_modes::{Band, DrivenMode, Start};
+use super::driven_modes::{Band, DrivenMode, Spectrum, Start};
 use super::film::Film;
 use super::members::{Points, mean_px};
 use super::motions::Motions;
 use super::sampling::Sampling;
-use super::subspace::{ONE_LAG_S, StablePole, stable_poles};
-use super::tree_modes::FoundMode;
+use super::subspace::{LAGS_S, StablePole, stable_poles};
 use super::turns::{TurnedPoints, turned_points};
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::NodeId;
 use nalgebra::{Point2, Vector2};
-use std::collections::BTreeSet;
 
+/// Rounds of the search.
+const ROUNDS: usize = LAGS_S.len();
 /// Points of a branch and all that it carries, and own points of what carries it, at most.
-const MOST_POINTS: usize = 60;
+pub(super) const MOST_POINTS: usize = 60;
 const MOST_OF_CARRIERS: usize = 40;
 /// Modes are reported from a core of so much from the lowest to the highest frequency; the band
-/// reaches so much farther to either side.
+/// reaches so much farther to either side. The first core begins where no tree sways so slowly.
 const CORE: f64 = 1.35;
+const LOWEST_HZ: f64 = 0.05;
 const MARGIN: f64 = 1.22;
 /// Modes in a band at most.
 const MOST_MODES: usize = 4;
@@ -39,10 +43,7 @@ pub(super) struct LocalMode {
     pub mode: Mode,
     pub ln_sd: LnDeviations,
     pub at_limit: bool,
-    /// Number of the view that shows it, and whether that is of a mode that was found before.
-    pub view: usize,
-    pub is_second_look: bool,
-    /// Points that it turns about one place, as indices of the film's tracks.
+    /// Points that it turns about one place, as indices of the film's tracks, in order.
     pub turned: Vec<usize>,
     /// That place, px.
     pub pivot_px: Point2<f64>,
@@ -50,24 +51,12 @@ pub(super) struct LocalMode {
     pub angle: f64,
     /// Share of its motion that is this turn.
     pub share: f64,
-    /// Points that were looked at.
+    /// Points that were looked at, in order.
     pub looked_at: Vec<usize>,
 }
 
-/// Points that modes are looked for in together.
-#[derive(Clone, Debug)]
-pub(super) struct View {
-    /// Points of a branch and of all that it carries, as indices of the film's tracks.
-    pub branch: Vec<usize>,
-    /// Points of what carries it.
-    pub carriers: Vec<usize>,
-    /// Where the branch begins, px.
-    pub base_px: Point2<f64>,
-}
-
-/// A view with its motions.
+/// The points of a branch and of what carries it, with their motions.
 struct Window {
-    number: usize,
     /// Of the film's tracks.
     tracks: Vec<usize>,
     at_px: Vec<Point2<f64>>,
@@ -76,77 +65,58 @@ struct Window {
     own_turn: Vec<Vector2<f64>>,
 }
 
-/// One view of every captured branch.
-pub(super) fn views_of_branches(
+/// The modes near every captured branch; `members` are the points of each and of what it carries.
+pub(super) fn local_modes(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
-) -> Vec<View> {
-    let mut out = Vec::with_capacity(members.len());
-    for branch in (1..members.len() as u32).map(NodeId) {
-        let mut carriers = Vec::new();
-        for carrier in tree.carriers(branch) {
-            let of_carrier = members.get(carrier.index()).into_iter().flatten();
-            let own = of_carrier.filter(|k| film.tracks[**k].node == carrier);
-            carriers.extend(own.copied());
-        }
-        carriers.sort_unstable();
-        out.push(View {
-            branch: members[branch.index()].clone(),
-            carriers,
-            base_px: tree.branches[branch.index()].base_px,
-        });
-    }
-    out
-}
-
-/// One view of every mode: of the points that it turns, and of what carries them.
-pub(super) fn views_of_modes(modes: &[FoundMode]) -> Vec<View> {
-    let mut out = Vec::with_capacity(modes.len());
-    for mode in modes {
-        let mut carriers = BTreeSet::new();
-        for other in modes.iter().filter(|other| other.carries(mode)) {
-            carriers.extend(other.tracks.iter().copied());
-        }
-        for k in &mode.tracks {
-            carriers.remove(k);
-        }
-        out.push(View {
-            branch: mode.tracks.clone(),
-            carriers: carriers.into_iter().collect(),
-            base_px: mode.pivot_px,
-        });
-    }
-    out
-}
-
-/// The modes of all views; each view's number is its place.
-pub(super) fn local_modes(
-    film: &Film,
-    views: &[View],
     sampling: &Sampling,
     cancel: &CancelToken,
 ) -> Vec<LocalMode> {
     let mut out = Vec::new();
-    for (number, view) in views.iter().enumerate() {
+    for branch in (1..members.len() as u32).map(NodeId) {
         if cancel.is_cancelled() {
             break;
         }
-        if let Some(window) = Window::of(film, view, sampling, number) {
+        if let Some(window) = Window::of(tree, film, members, branch, sampling) {
             out.extend(window.modes(sampling.frequencies_hz, cancel));
         }
     }
     out
 }
 
+/// The points on the branches that carry one and on nothing that these carry, in order.
+fn points_of_carriers(
+    tree: &BranchTree,
+    film: &Film,
+    members: &[Vec<usize>],
+    branch: NodeId,
+) -> Vec<usize> {
+    let mut out = Vec::new();
+    for carrier in tree.carriers(branch) {
+        let of_carrier = members.get(carrier.index()).into_iter().flatten();
+        let own = of_carrier.filter(|k| film.tracks[**k].node == carrier);
+        out.extend(own.copied());
+    }
+    out.sort_unstable();
+    out
+}
+
 impl Window {
-    fn of(film: &Film, view: &View, sampling: &Sampling, number: usize) -> Option<Self> {
-        let mut points = Points::up_to(MOST_POINTS, film, &view.branch, 0);
+    fn of(
+        tree: &BranchTree,
+        film: &Film,
+        members: &[Vec<usize>],
+        branch: NodeId,
+        sampling: &Sampling,
+    ) -> Option<Self> {
+        let mut points = Points::up_to(MOST_POINTS, film, &members[branch.index()], 0);
         let own = points.tracks.len();
         if own < MIN_POINTS {
             return None;
         }
-        let carriers = Points::up_to(MOST_OF_CARRIERS, film, &view.carriers, 0);
+        let of_carriers = points_of_carriers(tree, film, members, branch);
+        let carriers = Points::up_to(MOST_OF_CARRIERS, film, &of_carriers, 0);
         points.tracks.extend(carriers.tracks);
         points.signals.extend(carriers.signals);
         let frames = sampling.frames_with(&[&points]).ok()?;
@@ -155,13 +125,13 @@ impl Window {
         for &k in &points.tracks {
             at_px.push(mean_px(&film.tracks[k].at_px));
         }
+        let base_px = tree.branches[branch.index()].base_px;
         let mut own_turn = vec![Vector2::zeros(); at_px.len()];
         for (moved, at) in own_turn.iter_mut().zip(&at_px).take(own) {
-            let arm = at - view.base_px;
+            let arm = at - base_px;
             *moved = Vector2::new(-arm.y, arm.x);
         }
         Some(Self {
-            number,
             tracks: points.tracks,
             at_px,
             motions,
@@ -172,36 +142,57 @@ impl Window {
     fn modes(&self, within_hz: Bounds, cancel: &CancelToken) -> Vec<LocalMode> {
         let lowest_hz = within_hz.lo.max(LEAST_PERIODS / self.motions.span_s());
         let within_hz = Bounds::new(lowest_hz, within_hz.hi);
-        let channels = self.motions.of_like_size();
-        let poles = stable_poles(&channels, self.motions.step_s(), within_hz, &ONE_LAG_S);
         let spectrum = self.motions.spectrum(within_hz);
-        let own_turn = self.motions.sizes_of(&self.own_turn);
+        let channels = self.motions.of_like_size();
         let mut out = Vec::new();
-        for core in cores(&poles, within_hz) {
-            let band_hz = Bounds::new(
-                (core.lo / MARGIN).max(within_hz.lo),
-                (core.hi * MARGIN).min(within_hz.hi),
-            );
-            let Some(band) = Band::of(&spectrum, band_hz) else {
-                continue;
-            };
-            let mut starts = starts(&band, &poles, band_hz);
-            if let Some(shape) = band.shape_of(&own_turn) {
-                let others: Vec<_> = starts.iter().map(|s| s.shape).collect();
-                let frequency_hz = band.peak_hz(&shape, &others);
-                starts.push(Start {
-                    frequency_hz,
-                    shape,
-                });
-            }
-            if starts.is_empty() || cancel.is_cancelled() {
-                continue;
-            }
-            let fit = band.fit(&starts, cancel);
-            for found in band.modes(&fit) {
-                if core.contains(found.mode.frequency_hz) {
-                    out.extend(self.local(&found));
+        for (round, lag_s) in LAGS_S.iter().enumerate() {
+            let step_s = self.motions.step_s();
+            let poles = stable_poles(&channels, step_s, within_hz, &[*lag_s]);
+            for core in cores(round, within_hz) {
+                if cancel.is_cancelled() {
+                    return out;
                 }
+                if poles.iter().any(|pole| core.contains(pole.frequency_hz)) {
+                    out.extend(self.modes_in(core, &spectrum, &poles, within_hz, cancel));
+                }
+            }
+        }
+        out
+    }
+
+    /// The modes of one core.
+    fn modes_in(
+        &self,
+        core: Bounds,
+        spectrum: &Spectrum,
+        poles: &[StablePole],
+        within_hz: Bounds,
+        cancel: &CancelToken,
+    ) -> Vec<LocalMode> {
+        let band_hz = Bounds::new(
+            (core.lo / MARGIN).max(within_hz.lo),
+            (core.hi * MARGIN).min(within_hz.hi),
+        );
+        let Some(band) = Band::of(spectrum, band_hz) else {
+            return Vec::new();
+        };
+        let mut starts = starts(&band, poles, band_hz);
+        if let Some(shape) = band.shape_of(&self.motions.sizes_of(&self.own_turn)) {
+            let others: Vec<_> = starts.iter().map(|s| s.shape).collect();
+            let frequency_hz = band.peak_hz(&shape, &others);
+            starts.push(Start {
+                frequency_hz,
+                shape,
+            });
+        }
+        if starts.is_empty() {
+            return Vec::new();
+        }
+        let fit = band.fit(&starts, cancel);
+        let mut out = Vec::new();
+        for found in band.modes(&fit) {
+            if core.contains(found.mode.frequency_hz) {
+                out.extend(self.local(&found));
             }
         }
         out
@@ -219,26 +210,31 @@ impl Window {
             mode: found.mode,
             ln_sd: found.ln_sd,
             at_limit: found.at_limit,
-            view: self.number,
-            is_second_look: false,
-            turned: points.iter().map(|p| self.tracks[*p]).collect(),
+            turned: in_order(points.iter().map(|p| self.tracks[*p])),
             pivot_px,
             angle,
             share,
-            looked_at: self.tracks.clone(),
+            looked_at: in_order(self.tracks.iter().copied()),
         })
     }
 }
 
-/// Bands that modes are reported from: each begins at the lowest pole that is in none before.
-fn cores(poles: &[StablePole], within_hz: Bounds) -> Vec<Bounds> {
-    let mut out: Vec<Bounds> = Vec::new();
-    for pole in poles {
-        if out.last().is_none_or(|last| pole.frequency_hz > last.hi) {
-            let lo = (0.97 * pole.frequency_hz).max(within_hz.lo);
-            let lo = out.last().map_or(lo, |last| lo.max(last.hi));
+fn in_order(indices: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut out: Vec<usize> = indices.collect();
+    out.sort_unstable();
+    out
+}
+
+/// Bands that modes are reported from, side by side; those of each round lie between those of the
+/// others.
+fn cores(round: usize, within_hz: Bounds) -> Vec<Bounds> {
+    let mut out = Vec::new();
+    let mut lo = LOWEST_HZ * CORE.powf(round as f64 / ROUNDS as f64);
+    while lo < within_hz.hi {
+        if CORE * lo > within_hz.lo {
             out.push(Bounds::new(lo, CORE * lo));
         }
+        lo *= CORE;
     }
     out
 }

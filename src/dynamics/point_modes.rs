@@ -37,6 +37,8 @@ pub struct Shoot {
 #[derive(Clone, Debug)]
 pub(super) struct PointMode {
     pub mode: Mode,
+    /// The captured branch whose own it is, where it was looked for in that branch's points.
+    pub branch: Option<usize>,
     /// As indices of the film's tracks, in order.
     pub tracks: Vec<usize>,
     /// The clearest are believed first.
@@ -85,6 +87,15 @@ fn known_modes(branches: impl Iterator<Item = NodeId>, sways: &[Swaying]) -> Vec
 }
 
 impl PointMode {
+    /// Whether an answer's interval and that of the mode have no frequency in common.
+    fn contradicts(&self, answer: &Swaying) -> bool {
+        let own = &self.sway.frequency_hz;
+        answer.as_ref().is_ok_and(|answer| {
+            let other = &answer.frequency_hz;
+            own.hi < other.lo || other.hi < own.lo
+        })
+    }
+
     fn is_of_carrier(&self, carriers: &[Mode]) -> bool {
         let mut carriers = carriers.iter();
         carriers.any(|c| c.has_frequency_of(&self.mode, self.same_within))
@@ -92,13 +103,26 @@ impl PointMode {
 }
 
 impl PointModes {
-    /// Answers for the branches of `sways`, but for the trunk, that have none.
+    /// Answers for the branches of `sways`, but for the trunk, that have none, and for those whose
+    /// own mode was looked for in their points. Where that and the answer that is there contradict
+    /// each other, nothing is known.
     pub fn answer(&self, tree: &BranchTree, sways: &mut [Swaying]) {
         for b in 2..sways.len() {
+            let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
+            let mut own = self.modes.iter().filter(|mode| mode.branch == Some(b));
+            if let Some(mode) = own.next() {
+                if mode.is_sure && !mode.is_of_carrier(&carriers) {
+                    sways[b] = if mode.contradicts(&sways[b]) {
+                        Err(Unidentified::TooUncertain)
+                    } else {
+                        Ok(mode.sway)
+                    };
+                }
+                continue;
+            }
             if !is_open(&sways[b]) {
                 continue;
             }
-            let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
             let mode = self.mode_of(b, &carriers);
             if let Some(mode) = mode.filter(|mode| mode.is_sure) {
                 sways[b] = Ok(mode.sway);
@@ -125,8 +149,12 @@ impl PointModes {
             if own.len() < MIN_POINTS_OF_SHOOT || (own.len() as f64) < least {
                 continue;
             }
-            let carriers = std::iter::once(branch).chain(tree.carriers(branch));
-            if mode.is_of_carrier(&known_modes(carriers, sways)) {
+            let carriers: Vec<NodeId> = std::iter::once(branch)
+                .chain(tree.carriers(branch))
+                .collect();
+            let mut of_carriers = known_modes(carriers.iter().copied(), sways);
+            of_carriers.extend(self.own_modes(&carriers));
+            if mode.is_of_carrier(&of_carriers) {
                 continue;
             }
             for &k in &own {
@@ -140,11 +168,22 @@ impl PointModes {
         out
     }
 
+    /// The modes that were looked for in the points of some branches.
+    fn own_modes(&self, branches: &[NodeId]) -> impl Iterator<Item = Mode> {
+        let own = self.modes.iter().filter(|mode| {
+            let branch = mode.branch;
+            branches.iter().any(|b| branch == Some(b.index()))
+        });
+        own.map(|mode| mode.mode)
+    }
+
     /// The smallest captured branch that has most of a mode's points; `None` where there is none,
     /// or the mode is that of a captured branch.
     fn carrier_of(&self, mode: &PointMode) -> Option<usize> {
         let captured = 1..self.on.len();
-        if captured.clone().any(|b| self.similarity(b, mode).is_some()) {
+        let is_captured =
+            mode.branch.is_some() || captured.clone().any(|b| self.similarity(b, mode).is_some());
+        if is_captured {
             return None;
         }
         let least = MIN_SHARE_ON_CARRIER * mode.tracks.len() as f64;

@@ -7,10 +7,8 @@ use crate::bounds::Bounds;
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
-/// Lags up to which covariances are used, s, each in turn: what is a mode is one by all. One alone
-/// takes a quarter of the time.
+/// Lags up to which covariances are used, s, each in turn: what is a mode is one by all.
 pub(super) const LAGS_S: [f64; 3] = [1.2, 1.6, 2.2];
-pub(super) const ONE_LAG_S: [f64; 1] = [1.6];
 /// Orders of the system, and their step.
 const LEAST_ORDER: usize = 4;
 const MOST_ORDER: usize = 42;

@@ -65,7 +65,8 @@ pub fn analyse(
     };
     let mut sways = usable.one_by_one(&tree, cancel);
     let mut found = None;
-    if depth == Depth::Full && sways.iter().any(is_open) {
+    let is_wind = usable.onset.excitation == Excitation::Wind;
+    if depth == Depth::Full && (is_wind || sways.iter().any(is_open)) {
         found = usable.all_at_once(&tree, &sways, cancel);
         match &found {
             Some(modes) => modes.answer(&tree, &mut sways),

@@ -1,22 +1,23 @@
-//! Modes of the whole tree in wind: those that were found near its branches, each once.
+//! Modes of the tree in wind: what all local modes say together.
 //!
-//! A mode is seen from many windows: from the branch that swings in it, from those on that, and from
-//! what carries it. What has one frequency and turns the same points is one mode; the window that
-//! shows most of it knows it best, and how far the others are off tells how sure it is.
+//! A local mode votes for the captured branches whose points it turns, the more the better its points
+//! are the branch's. A branch's own mode is where most votes are along the frequency (mean shift,
+//! Fukunaga and Hostetler 1975), not counting those at the frequencies of what carries it. Local
+//! modes that vote for no captured branch are those of branches that the tree lacks: of these, like
+//! ones vote together.
 
 use super::branch_tree::BranchTree;
 use super::branches::{BranchMode, LnDeviations, SearchLimits};
+use super::decay::Mode;
 use super::film::Film;
-use super::local_modes::{LocalMode, local_modes, views_of_branches, views_of_modes};
-use super::members::share_among;
+use super::local_modes::{LocalMode, MOST_POINTS, local_modes};
+use super::members::count_among;
 use super::point_modes::{PointMode, PointModes};
 use super::sampling::Sampling;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::model::{Excitation, Sway};
-use crate::signal::median;
-use nalgebra::Point2;
-use std::collections::BTreeSet;
+use crate::model::{Excitation, NodeId, Sway};
+use nalgebra::{Point2, Vector2};
 use std::f64::consts::SQRT_2;
 
 /// A local mode counts if the logarithm of its frequency is known to this standard deviation, it is
@@ -25,52 +26,42 @@ const MAX_LN_FREQUENCY_SD: f64 = 0.03;
 const DAMPING: Bounds = Bounds::new(0.005, 0.12);
 const MIN_SHARE: f64 = 0.8;
 const MIN_POINTS: usize = 4;
-/// Two are one if their frequencies are no farther apart than this share, and if of the points that
-/// either turns and both windows have, so many are turned by both.
-const SAME_FREQUENCY: f64 = 0.05;
-const SAME_POINTS: f64 = 0.6;
-/// Of fewer points that two windows have in common nothing follows.
-const MIN_COMMON: usize = 3;
-/// A point has a mode if so many of the windows that show it say so.
-const MIN_SHARE_OF_WINDOWS: f64 = 0.5;
-/// What one window alone shows must be so much one turn, of so many points.
-const MIN_SHARE_ALONE: f64 = 0.9;
-const MIN_POINTS_ALONE: usize = 6;
+/// It votes for a branch that has so much of its points, if it turns so much of that branch's, and if
+/// so much of the branch was looked at.
+const MIN_SHARE_OF_POINTS: f64 = 0.5;
+const MIN_SHARE_LOOKED_AT: f64 = 0.5;
+/// It votes for the branch that fits best, and for those that fit to this share of how well that does.
+const NEAR_BEST: f64 = 0.9;
+/// Votes that a mode needs: two of the three rounds of the search must find it.
+const MIN_VOTES: f64 = 2.0;
+/// Votes are counted together if their frequencies are about this share apart, which is as far as the
+/// frequency of one may be uncertain.
+const KERNEL: f64 = MAX_LN_FREQUENCY_SD;
+const MEAN_SHIFTS: usize = 10;
+/// A vote that is nearer to a carrier's mode than so many standard deviations is for that.
+const CARRIER_SIGMAS: f64 = 2.0;
 /// A standard deviation is so much wider than the curvature says, by such a share of how far the
-/// windows are apart, and no less than this.
+/// votes are apart, and no less than this.
 const CI_INFLATION: f64 = 1.1;
 const SHARE_OF_SPREAD: f64 = 0.5;
 const MIN_LN_SD: LnDeviations = LnDeviations {
     frequency: 0.01,
     damping: 0.25,
 };
-/// A mode with so many of its points in a clearer one, and a frequency that is no more standard
-/// deviations from it, is that one seen badly.
-const SHARE_IN_CLEARER: f64 = 0.6;
+/// Local modes that are no captured branch's are alike if their frequencies are no farther apart than
+/// this share, and if of the points that either turns and both show so many are turned by both. Of
+/// fewer points than these nothing follows.
+const SAME_FREQUENCY: f64 = 0.05;
+const SAME_POINTS: f64 = 0.6;
+const MIN_COMMON: usize = 3;
+/// A frequency that is no more standard deviations from a carrier's is the carrier's.
 const SAME_SIGMAS: f64 = 3.0;
 
 /// It is a captured branch's own if it is in so much of its points.
 const MIN_SHARE_OF_BRANCH: f64 = 0.6;
-/// A mode is carried by another one that has this share of its points.
-const SHARE_ON_CARRIER: f64 = 0.75;
 
-/// A mode with the points that swing in it: those on a branch and on what it carries.
-#[derive(Clone, Debug)]
-pub(super) struct FoundMode {
-    pub mode: BranchMode,
-    /// Indices of the film's tracks, in order.
-    pub tracks: Vec<usize>,
-    /// Place that they turn about, px.
-    pub pivot_px: Point2<f64>,
-    /// Root of the mean square of the turn, rad, and the share of the motion that it is.
-    pub angle: f64,
-    pub collinearity: f64,
-    /// Points times share of the motion, over all windows: how clear it is.
-    pub clearness: f64,
-}
-
-/// The modes of the tree, in two looks: near every captured branch, then near every mode that was
-/// found. What the second does not show is not believed. `None` where `cancel` ends the work before.
+/// The modes of the tree: those of captured branches, and those of branches that it lacks; `None`
+/// where `cancel` ends the work before.
 pub(super) fn point_modes(
     tree: &BranchTree,
     film: &Film,
@@ -79,69 +70,24 @@ pub(super) fn point_modes(
     cancel: &CancelToken,
 ) -> Option<PointModes> {
     let sampling = Sampling::of(film, limits);
-    let tracks = film.tracks.len();
-    let views = views_of_branches(tree, film, members);
-    let mut local = local_modes(film, &views, &sampling, cancel);
-    let candidates = merged(&local, tracks, |group| group.first());
-    let mut again = local_modes(film, &views_of_modes(&candidates), &sampling, cancel);
-    for mode in &mut again {
-        mode.view += views.len();
-        mode.is_second_look = true;
-    }
-    local.extend(again);
+    let mut local = local_modes(tree, film, members, &sampling, cancel);
     if cancel.is_cancelled() {
         return None;
     }
-    let modes = merged(&local, tracks, |group| {
-        group.iter().find(|seen| seen.mode.is_second_look)
-    });
-    let modes = modes
-        .iter()
-        .filter(|m| !limits.may_be_aliased(m.mode.mode.frequency_hz, film))
-        .map(|m| m.point_mode(limits.max_relative_ci))
-        .collect();
+    local.retain(counts);
+    let mut modes = Vec::new();
+    for (branch, found) in modes_of_branches(tree, members, &local).iter().enumerate() {
+        modes.extend(found.as_ref().map(|m| m.point_mode(Some(branch), limits)));
+    }
+    for found in modes_of_no_branch(members, &local) {
+        modes.push(found.point_mode(None, limits));
+    }
+    modes.retain(|m| !limits.may_be_aliased(m.mode.frequency_hz, film));
     Some(PointModes {
         modes,
         on: members.to_vec(),
         min_share_of_branch: MIN_SHARE_OF_BRANCH,
     })
-}
-
-/// The modes, the clearest first; `tracks` is the number of the film's. `best` chooses from the
-/// local modes that are one, clearest first, the one that tells it best.
-fn merged(
-    local: &[LocalMode],
-    tracks: usize,
-    best: impl for<'a, 'b> Fn(&'b [Seen<'a>]) -> Option<&'b Seen<'a>>,
-) -> Vec<FoundMode> {
-    let mut seen: Vec<Seen> = Vec::new();
-    for mode in local.iter().filter(|m| counts(m)) {
-        seen.push(Seen::of(mode, tracks));
-    }
-    seen.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-    let mut groups: Vec<Vec<Seen>> = Vec::new();
-    for mode in seen {
-        let nearest = groups
-            .iter_mut()
-            .filter_map(|group| Some((mode.likeness(group)?, group)))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
-        match nearest {
-            Some((_, group)) => group.push(mode),
-            None => groups.push(vec![mode]),
-        }
-    }
-    let mut modes: Vec<FoundMode> = groups
-        .iter()
-        .filter_map(|group| together(group, best(group)?))
-        .collect();
-    modes.sort_by(|a, b| b.clearness.total_cmp(&a.clearness));
-    let mut out: Vec<FoundMode> = Vec::new();
-    for mode in modes {
-        if !out.iter().any(|o| mode.is_badly_seen(o)) {
-            out.push(mode);
-        }
-    }
-    out
 }
 
 fn counts(mode: &LocalMode) -> bool {
@@ -152,124 +98,243 @@ fn counts(mode: &LocalMode) -> bool {
         && mode.turned.len() >= MIN_POINTS
 }
 
-/// A local mode with its points as flags, by track.
-struct Seen<'a> {
+/// A local mode, and how much it counts for a branch.
+#[derive(Clone, Copy)]
+struct Vote<'a> {
     mode: &'a LocalMode,
-    looked_at: Vec<bool>,
-    turned: Vec<bool>,
+    weight: f64,
 }
 
-impl<'a> Seen<'a> {
-    fn of(mode: &'a LocalMode, tracks: usize) -> Self {
-        Self {
-            mode,
-            looked_at: flags(&mode.looked_at, tracks),
-            turned: flags(&mode.turned, tracks),
-        }
-    }
-
-    fn weight(&self) -> f64 {
-        self.mode.share * self.mode.turned.len() as f64
-    }
-
-    /// How much a mode is that of a group; `None` where it is another one.
-    fn likeness(&self, group: &[Seen]) -> Option<f64> {
-        let first = group.first()?;
-        let apart = self.mode.mode.ln_frequency_ratio(&first.mode.mode).abs();
-        let overlaps = group.iter().map(|other| self.overlap(other));
-        let overlap = overlaps.sum::<f64>() / group.len() as f64;
-        let is_same = apart < SAME_FREQUENCY && overlap >= SAME_POINTS;
-        is_same.then(|| overlap - apart / SAME_FREQUENCY)
-    }
-
-    /// Of the points that either turns and both windows have, the share that both turn.
-    fn overlap(&self, other: &Seen) -> f64 {
-        let (mut both, mut either) = (0, 0);
-        for k in 0..self.turned.len() {
-            if self.looked_at[k] && other.looked_at[k] {
-                both += usize::from(self.turned[k] && other.turned[k]);
-                either += usize::from(self.turned[k] || other.turned[k]);
-            }
-        }
-        if either < MIN_COMMON {
-            return 0.0;
-        }
-        both as f64 / either as f64
-    }
+/// What votes say together.
+struct FoundMode {
+    mode: BranchMode,
+    votes: f64,
+    /// Points that most of the votes which show them turn, as indices of the film's tracks, in order.
+    tracks: Vec<usize>,
+    /// Place that they turn about, px.
+    pivot_px: Point2<f64>,
+    /// Root of the mean square of the turn, rad, and the share of the motion that it is.
+    angle: f64,
+    collinearity: f64,
 }
 
-fn flags(indices: &[usize], len: usize) -> Vec<bool> {
-    let mut out = vec![false; len];
-    for &k in indices {
-        out[k] = true;
+/// By branch: whether it has points that no one branch on it has, by which the two can be told
+/// apart.
+fn are_told_apart(tree: &BranchTree, members: &[Vec<usize>]) -> Vec<bool> {
+    let mut out = vec![true; members.len()];
+    for (branch, points) in tree.branches.iter().zip(members) {
+        if let Some(carrier) = branch.parent.map(NodeId::index) {
+            let all = members[carrier].len() as f64;
+            out[carrier] &= (points.len() as f64) < NEAR_BEST * all;
+        }
     }
     out
 }
 
-/// One mode from a group, which `first` tells best; `None` where too little shows it.
-fn together(group: &[Seen], first: &Seen) -> Option<FoundMode> {
-    let mut tracks = Vec::new();
-    for k in 0..first.turned.len() {
-        let looked_at = group.iter().filter(|s| s.looked_at[k]).count() as f64;
-        let turned = group.iter().filter(|s| s.turned[k]).count() as f64;
-        if turned > 0.0 && turned >= MIN_SHARE_OF_WINDOWS * looked_at {
-            tracks.push(k);
+/// By branch: its own mode.
+fn modes_of_branches(
+    tree: &BranchTree,
+    members: &[Vec<usize>],
+    local: &[LocalMode],
+) -> Vec<Option<FoundMode>> {
+    let fits: Vec<Vec<f64>> = local.iter().map(|m| fits(m, members)).collect();
+    let told_apart = are_told_apart(tree, members);
+    let mut out: Vec<Option<FoundMode>> = Vec::with_capacity(members.len());
+    for branch in 0..members.len() {
+        if !told_apart[branch] {
+            out.push(None);
+            continue;
+        }
+        let mut carriers: Vec<BranchMode> = Vec::new();
+        for carrier in tree.carriers(NodeId(branch as u32)) {
+            let found = out.get(carrier.index()).and_then(Option::as_ref);
+            carriers.extend(found.map(|found| found.mode));
+        }
+        let mut votes = Vec::new();
+        for (mode, fits) in local.iter().zip(&fits) {
+            let (fit, best) = (fits[branch], best(fits));
+            if fit > 0.0
+                && fit >= NEAR_BEST * best
+                && !carriers.iter().any(|c| is_of_carrier(mode, c))
+            {
+                let weight = mode.share * fit;
+                votes.push(Vote { mode, weight });
+            }
+        }
+        let found = FoundMode::of(&votes);
+        out.push(found.filter(|found| found.votes >= MIN_VOTES));
+    }
+    out
+}
+
+fn best(fits: &[f64]) -> f64 {
+    fits.iter().copied().fold(0.0, f64::max)
+}
+
+/// How alike the points of a mode and those of every branch are that it shows, 0 to 1; 0 where it
+/// has no vote.
+fn fits(mode: &LocalMode, members: &[Vec<usize>]) -> Vec<f64> {
+    let mut out = Vec::with_capacity(members.len());
+    for points in members {
+        let looked_at = count_among(&mode.looked_at, points) as f64;
+        let both = count_among(&mode.turned, points) as f64;
+        let turned = mode.turned.len() as f64;
+        let has_vote = looked_at >= MIN_SHARE_LOOKED_AT * points.len().min(MOST_POINTS) as f64
+            && both >= MIN_POINTS as f64
+            && both >= MIN_SHARE_OF_POINTS * looked_at
+            && both >= MIN_SHARE_OF_POINTS * turned;
+        out.push(if has_vote {
+            both / (looked_at + turned - both)
+        } else {
+            0.0
+        });
+    }
+    out
+}
+
+fn is_of_carrier(mode: &LocalMode, carrier: &BranchMode) -> bool {
+    let sd = mode.ln_sd.frequency.hypot(carrier.ln_sd.frequency);
+    mode.mode
+        .has_frequency_of(&carrier.mode, CARRIER_SIGMAS * sd)
+}
+
+/// Modes of points that are no captured branch's, those with most votes first.
+fn modes_of_no_branch(members: &[Vec<usize>], local: &[LocalMode]) -> Vec<FoundMode> {
+    let mut votes: Vec<Vote> = Vec::new();
+    for mode in local {
+        if best(&fits(mode, members)) == 0.0 {
+            let weight = mode.share;
+            votes.push(Vote { mode, weight });
         }
     }
-    let windows: BTreeSet<usize> = group.iter().map(|s| s.mode.view).collect();
-    let is_alone = windows.len() == 1;
-    let is_clear_alone = first.mode.share > MIN_SHARE_ALONE && tracks.len() >= MIN_POINTS_ALONE;
-    if tracks.len() < MIN_POINTS || is_alone && !is_clear_alone {
-        return None;
+    votes.sort_by(|a, b| {
+        let [a, b] = [a, b].map(|v| v.weight * v.mode.turned.len() as f64);
+        b.total_cmp(&a)
+    });
+    let mut groups: Vec<Vec<Vote>> = Vec::new();
+    for vote in votes {
+        let mut like = groups.iter_mut().filter(|g| is_like(vote.mode, g[0].mode));
+        match like.next() {
+            Some(group) => group.push(vote),
+            None => groups.push(vec![vote]),
+        }
     }
-    let mut squares = 0.0;
-    let mut deviations: Vec<f64> = Vec::new();
-    for seen in group {
-        squares += seen.mode.mode.ln_frequency_ratio(&first.mode.mode).powi(2);
-        deviations.push(seen.mode.ln_sd.frequency);
-    }
-    let spread = SHARE_OF_SPREAD * (squares / group.len() as f64).sqrt();
-    let ln_sd = LnDeviations {
-        frequency: median(deviations, f64::total_cmp)?.max(first.mode.ln_sd.frequency),
-        damping: first.mode.ln_sd.damping,
-    };
-    let mut ln_sd = ln_sd.inflated(CI_INFLATION, &MIN_LN_SD);
-    ln_sd.frequency = ln_sd.frequency.hypot(spread);
-    Some(FoundMode {
-        mode: BranchMode {
-            mode: first.mode.mode,
-            ln_sd,
-        },
-        tracks,
-        pivot_px: first.mode.pivot_px,
-        angle: first.mode.angle,
-        collinearity: first.mode.share,
-        clearness: group.iter().map(Seen::weight).sum(),
-    })
+    let mut out: Vec<FoundMode> = groups.iter().filter_map(|g| FoundMode::of(g)).collect();
+    out.retain(|found| found.votes >= MIN_VOTES && found.tracks.len() >= MIN_POINTS);
+    out.sort_by(|a, b| b.votes.total_cmp(&a.votes));
+    out
+}
+
+/// Whether two local modes are of the same points and have the same frequency.
+fn is_like(a: &LocalMode, b: &LocalMode) -> bool {
+    let both = count_among(&a.turned, &b.turned);
+    let either = count_among(&a.turned, &b.looked_at) + count_among(&b.turned, &a.looked_at) - both;
+    either >= MIN_COMMON
+        && both as f64 >= SAME_POINTS * either as f64
+        && a.mode.has_frequency_of(&b.mode, SAME_FREQUENCY)
 }
 
 impl FoundMode {
-    fn is_badly_seen(&self, clearer: &FoundMode) -> bool {
-        let share = share_among(&self.tracks, &clearer.tracks);
-        let sd = self
-            .mode
-            .ln_sd
-            .frequency
-            .hypot(clearer.mode.ln_sd.frequency);
-        share >= SHARE_IN_CLEARER
-            && self
-                .mode
-                .mode
-                .has_frequency_of(&clearer.mode.mode, SAME_SIGMAS * sd)
+    /// Where most of some votes are; `None` where there are none.
+    fn of(votes: &[Vote]) -> Option<Self> {
+        let mut most = (0.0, None);
+        for vote in votes {
+            let near = Near::of(votes, &vote.mode.mode);
+            if near.weight > most.0 {
+                most = (near.weight, Some(vote.mode.mode));
+            }
+        }
+        let mut mode = most.1?;
+        for _ in 0..MEAN_SHIFTS {
+            mode = Near::of(votes, &mode).mean;
+        }
+        Some(Near::of(votes, &mode).found())
+    }
+}
+
+/// Votes near a mode, weighted by how near they are.
+struct Near<'a> {
+    votes: Vec<Vote<'a>>,
+    weight: f64,
+    /// Their mean frequency and damping ratio, by logarithms.
+    mean: Mode,
+}
+
+impl<'a> Near<'a> {
+    fn of(votes: &[Vote<'a>], mode: &Mode) -> Self {
+        let mut near = Vec::with_capacity(votes.len());
+        let (mut sum, mut parameters) = (0.0, Vector2::zeros());
+        for vote in votes {
+            let off = vote.mode.mode.ln_frequency_ratio(mode) / KERNEL;
+            let weight = vote.weight * (-0.5 * off * off).exp();
+            sum += weight;
+            parameters += weight * Vector2::from(vote.mode.mode.parameters());
+            near.push(Vote { weight, ..*vote });
+        }
+        parameters /= sum.max(f64::MIN_POSITIVE);
+        Self {
+            votes: near,
+            weight: sum,
+            mean: Mode::of_parameters(parameters.as_slice()),
+        }
     }
 
-    /// Whether most of another mode's points swing in this one, too, and more besides.
-    pub fn carries(&self, other: &FoundMode) -> bool {
-        share_among(&other.tracks, &self.tracks) >= SHARE_ON_CARRIER
-            && self.tracks.len() > other.tracks.len()
+    /// Weighted mean of a value.
+    fn mean_of(&self, value: impl Fn(&LocalMode) -> f64) -> f64 {
+        let sum: f64 = self.votes.iter().map(|v| v.weight * value(v.mode)).sum();
+        sum / self.weight
     }
 
-    fn point_mode(&self, max_relative_ci: f64) -> PointMode {
+    fn found(&self) -> FoundMode {
+        let variances = LnDeviations {
+            frequency: self.mean_of(|m| m.ln_sd.frequency.powi(2)),
+            damping: self.mean_of(|m| m.ln_sd.damping.powi(2)),
+        };
+        let ln_sd = LnDeviations {
+            frequency: variances.frequency.sqrt(),
+            damping: variances.damping.sqrt(),
+        };
+        let apart = self.mean_of(|m| m.mode.ln_frequency_ratio(&self.mean).powi(2));
+        let mut ln_sd = ln_sd.inflated(CI_INFLATION, &MIN_LN_SD);
+        ln_sd.frequency = ln_sd.frequency.hypot(SHARE_OF_SPREAD * apart.sqrt());
+        let (pivot_u, pivot_v) = (
+            self.mean_of(|m| m.pivot_px.x),
+            self.mean_of(|m| m.pivot_px.y),
+        );
+        FoundMode {
+            mode: BranchMode {
+                mode: self.mean,
+                ln_sd,
+            },
+            votes: self.weight,
+            tracks: self.tracks(),
+            pivot_px: Point2::new(pivot_u, pivot_v),
+            angle: self.mean_of(|m| m.angle),
+            collinearity: self.mean_of(|m| m.share),
+        }
+    }
+
+    /// Points that most of the votes which show them turn.
+    fn tracks(&self) -> Vec<usize> {
+        let mut balance: Vec<f64> = Vec::new();
+        for vote in &self.votes {
+            for &k in &vote.mode.looked_at {
+                if balance.len() <= k {
+                    balance.resize(k + 1, 0.0);
+                }
+                balance[k] -= 0.5 * vote.weight;
+            }
+            for &k in &vote.mode.turned {
+                balance[k] += vote.weight;
+            }
+        }
+        let all = 0..balance.len();
+        all.filter(|k| balance[*k] > 0.0).collect()
+    }
+}
+
+impl FoundMode {
+    fn point_mode(&self, branch: Option<usize>, limits: &SearchLimits) -> PointMode {
         let sway = Sway {
             frequency_hz: self.mode.frequency_hz(),
             damping_ratio: self.mode.damping_ratio(),
@@ -278,11 +343,12 @@ impl FoundMode {
         };
         PointMode {
             mode: self.mode.mode,
+            branch,
             tracks: self.tracks.clone(),
-            clearness: self.clearness,
+            clearness: self.votes,
             same_within: SAME_SIGMAS * self.mode.ln_sd.frequency,
             sway,
-            is_sure: self.mode.is_within(max_relative_ci),
+            is_sure: self.mode.is_within(limits.max_relative_ci),
             collinearity: self.collinearity,
             pivot_px: self.pivot_px,
         }
@@ -292,10 +358,10 @@ impl FoundMode {
 #[cfg(test)]
 mod tests {
     use super::super::film::FilmTrack;
-    use super::super::shoots;
+    use super::super::{Depth, analyse, shoots};
     use super::*;
     use crate::config::{Dynamics, Excited};
-    use crate::model::{Node, NodeId, Size, Skeleton};
+    use crate::model::{Node, NodeId, Size, Skeleton, TreeMode};
     use crate::random::generator;
     use nalgebra::Vector2;
     use rand::RngExt;
@@ -396,23 +462,20 @@ mod tests {
     }
 
     #[test]
-    fn both_modes_are_told_with_their_points() {
+    fn both_modes_are_found_with_their_points() {
         let (skeleton, film) = filmed();
-        let tree = BranchTree::of(&skeleton);
-        let limits = SearchLimits {
-            frequencies_hz: Bounds::new(0.05, 5.0),
-            highest_hz: 5.0,
-            max_relative_ci: 0.05,
+        let config = Dynamics {
+            excitation: Excited::Wind,
+            ..Dynamics::default()
         };
-        let members = super::super::members::members(&tree, &film);
         let cancel = CancelToken::new();
-        let found = point_modes(&tree, &film, &members, &limits, &cancel).expect("modes");
+        let found = analyse(&skeleton, &film, &config, Depth::Full, &cancel).modes;
         for (frequency_hz, points) in [(0.6, 20), (1.3, 8)] {
-            let holds = |m: &&PointMode| m.sway.frequency_hz.holds(frequency_hz);
-            let mode = found.modes.iter().find(holds);
-            let mode = mode.unwrap_or_else(|| panic!("{frequency_hz} Hz: {:?}", found.modes));
-            let off = mode.tracks.len().abs_diff(points);
-            assert!(off <= 2, "{frequency_hz} Hz: {:?}", mode.tracks);
+            let holds = |m: &&TreeMode| m.sway.frequency_hz.holds(frequency_hz);
+            let mode = found.iter().find(holds);
+            let mode = mode.unwrap_or_else(|| panic!("{frequency_hz} Hz: {found:?}"));
+            let off = mode.points.abs_diff(points);
+            assert!(off <= 2, "{frequency_hz} Hz: {mode:?}");
         }
     }
 }

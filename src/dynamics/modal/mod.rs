@@ -96,6 +96,7 @@ pub(super) fn point_modes(
             && !limits.may_be_aliased(estimate.mode.frequency_hz, film)
         {
             modes.push(PointMode {
+                branch: None,
                 mode: estimate.mode,
                 tracks: as_tracks(&estimate.points),
                 clearness: estimate.gain_together(),
