@@ -183,6 +183,8 @@ def found(told, film):
 
 def by_chance(film):
     """Share of the frequencies between the branches in view that are right."""
+    if not film.in_view_hz:
+        return float("nan")
     lo_hz, hi_hz = min(film.in_view_hz), max(film.in_view_hz)
     return np.mean([is_near(hz, film.in_view_hz) for hz in np.geomspace(lo_hz, hi_hz, 2000)])
 
@@ -210,7 +212,8 @@ def pooled(films, tolds):
     n = sum(len(told.answers_hz) for told in tolds)
     n_right = sum(right(told, film) for told, film in zip(tolds, films))
     n_found = sum(found(told, film) for told, film in zip(tolds, films))
-    return n, n_right / max(n, 1), n_found / sum(len(film.in_view_hz) for film in films)
+    n_in_view = sum(len(film.in_view_hz) for film in films)
+    return n, n_right / max(n, 1), n_found / max(n_in_view, 1)
 
 
 def errors(tolds):

@@ -32,6 +32,11 @@ const MOTION: &str = "motion_px2";
 /// A table of more modes than this is none of ours: a mode has four points or more.
 const MOST_MODES: usize = 10_000;
 
+/// Squares of motion that a table may have are smaller than this, and those that are written smaller
+/// than that: no tree moves so far.
+const MOST_PX2: f64 = 1e12;
+const LARGEST_PX2: f64 = 1e11;
+
 /// Writes `modes.csv`, the slowest mode first. `energy` names trunk and limbs with their shares of
 /// the mode's kinetic energy, the largest first: `limb_1 0.71; trunk 0.29`; `motion_px2` the nodes
 /// by their numbers, with the squares of the swing of the points on them: `3 12.5; 7 0.41`.
@@ -61,7 +66,8 @@ pub fn modes<W: Write>(out: W, skeleton: &Skeleton, modes: &[TreeMode]) -> Resul
 /// The nodes that move in a mode, with the squares of their motion.
 fn motion(mode: &TreeMode, skeleton: &Skeleton) -> String {
     let mut words = Vec::new();
-    for (node, px2) in skeleton.nodes.iter().zip(&mode.motion_px2) {
+    let by_node = skeleton.nodes.iter().zip(&mode.motion_px2);
+    for (node, px2) in by_node.filter(|(_, px2)| **px2 < LARGEST_PX2) {
         let px2 = number::text(*px2, 6);
         if !px2.is_empty() && px2 != "0" {
             words.push(format!("{} {px2}", node.name.0));
@@ -172,7 +178,7 @@ impl ModeCells<'_> {
             let (name, px2) = pair.split_once(' ').unwrap_or((pair, ""));
             let node = measured(name, skeleton)?;
             let px2 = px2.parse().ok();
-            let px2 = px2.filter(|x: &f64| (0.0..1e12).contains(x));
+            let px2 = px2.filter(|x: &f64| (0.0..MOST_PX2).contains(x));
             let px2 = px2.ok_or_else(|| {
                 format!("{MOTION} has {pair:?}, and must have a node and a square of px")
             })?;
@@ -273,6 +279,7 @@ mod tests {
             "2,0.7,0.686,0.714,0.04,0.0392,0.0408,wind,2.5,,9,,,,"
         );
     }
+
     /// Twice: what is written is what was read.
     #[test]
     fn a_table_is_read_back_as_it_was_written() {

@@ -72,6 +72,11 @@ pub(super) fn is_open(sway: &Swaying) -> bool {
     )
 }
 
+/// Whether all points at once may have another answer for a branch.
+pub(super) fn may_have_other(sway: &Swaying) -> bool {
+    sway.is_ok() || is_open(sway)
+}
+
 /// The mode that an answer stands for.
 pub(super) fn mode_of(sway: &Sway) -> Mode {
     Mode {
@@ -108,6 +113,9 @@ impl PointModes {
     /// each other, nothing is known.
     pub fn answer(&self, tree: &BranchTree, sways: &mut [Swaying]) {
         for b in 2..sways.len() {
+            if !may_have_other(&sways[b]) {
+                continue;
+            }
             let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
             let mut own = self.modes.iter().filter(|mode| mode.branch == Some(b));
             if let Some(mode) = own.next() {
@@ -207,7 +215,7 @@ impl PointModes {
     /// The mode that is most likely captured branch `b`'s.
     fn mode_of(&self, b: usize, carriers: &[Mode]) -> Option<&PointMode> {
         let mut best: Option<(f64, &PointMode)> = None;
-        for mode in &self.modes {
+        for mode in self.modes.iter().filter(|mode| mode.branch.is_none()) {
             let Some(similarity) = self.similarity(b, mode) else {
                 continue;
             };
@@ -219,5 +227,77 @@ impl PointModes {
             }
         }
         best.map(|(_, mode)| mode)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Excitation, Interval, Node, Size, Skeleton};
+
+    fn sway(frequency_hz: f64) -> Sway {
+        Sway {
+            frequency_hz: Interval {
+                value: frequency_hz,
+                lo: 0.97 * frequency_hz,
+                hi: 1.03 * frequency_hz,
+            },
+            damping_ratio: None,
+            excitation: Excitation::Wind,
+            amplitude_deg: 1.0,
+        }
+    }
+
+    /// A trunk of 0.5 Hz, and what is said of a limb on it of which all points at once say 1 Hz and
+    /// one branch after the other `before`.
+    fn limb_after(before: Swaying, voted_hz: f64) -> Swaying {
+        let nodes = vec![
+            Node::made_up(0, None, [0.0, 0.0, 0.0]),
+            Node::made_up(1, Some(0), [0.0, 100.0, 0.0]),
+            Node::made_up(2, Some(1), [50.0, 150.0, 0.0]),
+        ];
+        let skeleton = Skeleton {
+            nodes,
+            foot_px: Point2::new(300.0, 340.0),
+            image_size: Size {
+                width: 640,
+                height: 360,
+            },
+        };
+        let found = PointModes {
+            modes: vec![PointMode {
+                mode: mode_of(&sway(voted_hz)),
+                branch: Some(2),
+                tracks: (0..5).collect(),
+                clearness: 3.0,
+                same_within: 0.05,
+                sway: sway(voted_hz),
+                is_sure: true,
+                collinearity: 1.0,
+                pivot_px: Point2::new(300.0, 240.0),
+            }],
+            on: vec![(0..9).collect(), (0..9).collect(), (0..5).collect()],
+            min_share_of_branch: 0.6,
+        };
+        let mut sways = vec![Err(Unidentified::NotMeasured), Ok(sway(0.5)), before];
+        found.answer(&BranchTree::of(&skeleton), &mut sways);
+        assert_eq!(sways[1], Ok(sway(0.5)), "the trunk's stays");
+        sways[2]
+    }
+
+    #[test]
+    fn a_branch_gets_the_mode_that_its_points_have() {
+        let unknown = Err(Unidentified::NoOscillation);
+        assert_eq!(limb_after(unknown, 1.0), Ok(sway(1.0)));
+        assert_eq!(
+            limb_after(Ok(sway(1.02)), 1.0),
+            Ok(sway(1.0)),
+            "much the same"
+        );
+        let contradiction = limb_after(Ok(sway(1.2)), 1.0);
+        assert_eq!(contradiction, Err(Unidentified::TooUncertain));
+        assert_eq!(limb_after(unknown, 0.51), unknown, "the trunk's frequency");
+        let still = Err(Unidentified::TooLittleMotion);
+        assert_eq!(limb_after(still, 1.0), still);
     }
 }

@@ -6,7 +6,7 @@ use super::film::Film;
 use super::free_decay;
 use super::members::members;
 use super::modal;
-use super::point_modes::{PointModes, Shoot, is_open};
+use super::point_modes::{PointModes, Shoot, is_open, may_have_other};
 use super::release::{Onset, onset};
 use super::tree_modes;
 use super::whole_tree::modes_of_tree;
@@ -65,8 +65,11 @@ pub fn analyse(
     };
     let mut sways = usable.one_by_one(&tree, cancel);
     let mut found = None;
-    let is_wind = usable.onset.excitation == Excitation::Wind;
-    if depth == Depth::Full && (is_wind || sways.iter().any(is_open)) {
+    let is_worth_it = match usable.onset.excitation {
+        Excitation::Wind => sways.iter().any(may_have_other),
+        Excitation::Release => sways.iter().any(is_open),
+    };
+    if depth == Depth::Full && is_worth_it {
         found = usable.all_at_once(&tree, &sways, cancel);
         match &found {
             Some(modes) => modes.answer(&tree, &mut sways),

@@ -14,6 +14,7 @@ use super::local_modes::{LocalMode, MOST_POINTS, local_modes};
 use super::members::count_among;
 use super::point_modes::{PointMode, PointModes};
 use super::sampling::Sampling;
+use super::wind::trunk;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway};
@@ -32,12 +33,15 @@ const MIN_SHARE_OF_POINTS: f64 = 0.5;
 const MIN_SHARE_LOOKED_AT: f64 = 0.5;
 /// It votes for the branch that fits best, and for those that fit to this share of how well that does.
 const NEAR_BEST: f64 = 0.9;
-/// Votes that a mode needs: two of the three rounds of the search must find it.
+/// Votes that a mode needs, over all rounds and branches near which it was looked for; one whose
+/// points fit perfectly counts 1.
 const MIN_VOTES: f64 = 2.0;
 /// Votes are counted together if their frequencies are about this share apart, which is as far as the
 /// frequency of one may be uncertain.
 const KERNEL: f64 = MAX_LN_FREQUENCY_SD;
 const MEAN_SHIFTS: usize = 10;
+/// A point that less than this share of the votes for a mode shows is not known to have it.
+const MIN_WEIGHT_OF_POINT: f64 = 0.1;
 /// A vote that is nearer to a carrier's mode than so many standard deviations is for that.
 const CARRIER_SIGMAS: f64 = 2.0;
 /// A standard deviation is so much wider than the curvature says, by such a share of how far the
@@ -76,10 +80,17 @@ pub(super) fn point_modes(
     }
     local.retain(counts);
     let mut modes = Vec::new();
-    for (branch, found) in modes_of_branches(tree, members, &local).iter().enumerate() {
-        modes.extend(found.as_ref().map(|m| m.point_mode(Some(branch), limits)));
+    let fits: Vec<Vec<f64>> = local.iter().map(|m| fits(m, members)).collect();
+    let trunk = trunk(tree, members).index();
+    for (branch, found) in modes_of_branches(tree, members, &local, &fits)
+        .iter()
+        .enumerate()
+    {
+        // The trunk's is the fundamental of all points.
+        let found = found.as_ref().filter(|_| branch != trunk);
+        modes.extend(found.map(|m| m.point_mode(Some(branch), limits)));
     }
-    for found in modes_of_no_branch(members, &local) {
+    for found in modes_of_no_branch(&local, &fits) {
         modes.push(found.point_mode(None, limits));
     }
     modes.retain(|m| !limits.may_be_aliased(m.mode.frequency_hz, film));
@@ -136,8 +147,8 @@ fn modes_of_branches(
     tree: &BranchTree,
     members: &[Vec<usize>],
     local: &[LocalMode],
+    fits: &[Vec<f64>],
 ) -> Vec<Option<FoundMode>> {
-    let fits: Vec<Vec<f64>> = local.iter().map(|m| fits(m, members)).collect();
     let told_apart = are_told_apart(tree, members);
     let mut out: Vec<Option<FoundMode>> = Vec::with_capacity(members.len());
     for branch in 0..members.len() {
@@ -151,7 +162,7 @@ fn modes_of_branches(
             carriers.extend(found.map(|found| found.mode));
         }
         let mut votes = Vec::new();
-        for (mode, fits) in local.iter().zip(&fits) {
+        for (mode, fits) in local.iter().zip(fits) {
             let (fit, best) = (fits[branch], best(fits));
             if fit > 0.0
                 && fit >= NEAR_BEST * best
@@ -161,8 +172,7 @@ fn modes_of_branches(
                 votes.push(Vote { mode, weight });
             }
         }
-        let found = FoundMode::of(&votes);
-        out.push(found.filter(|found| found.votes >= MIN_VOTES));
+        out.push(FoundMode::of(&votes).filter(FoundMode::is_believed));
     }
     out
 }
@@ -199,10 +209,10 @@ fn is_of_carrier(mode: &LocalMode, carrier: &BranchMode) -> bool {
 }
 
 /// Modes of points that are no captured branch's, those with most votes first.
-fn modes_of_no_branch(members: &[Vec<usize>], local: &[LocalMode]) -> Vec<FoundMode> {
+fn modes_of_no_branch(local: &[LocalMode], fits: &[Vec<f64>]) -> Vec<FoundMode> {
     let mut votes: Vec<Vote> = Vec::new();
-    for mode in local {
-        if best(&fits(mode, members)) == 0.0 {
+    for (mode, fits) in local.iter().zip(fits) {
+        if best(fits) == 0.0 {
             let weight = mode.share;
             votes.push(Vote { mode, weight });
         }
@@ -220,7 +230,7 @@ fn modes_of_no_branch(members: &[Vec<usize>], local: &[LocalMode]) -> Vec<FoundM
         }
     }
     let mut out: Vec<FoundMode> = groups.iter().filter_map(|g| FoundMode::of(g)).collect();
-    out.retain(|found| found.votes >= MIN_VOTES && found.tracks.len() >= MIN_POINTS);
+    out.retain(FoundMode::is_believed);
     out.sort_by(|a, b| b.votes.total_cmp(&a.votes));
     out
 }
@@ -248,7 +258,7 @@ impl FoundMode {
         for _ in 0..MEAN_SHIFTS {
             mode = Near::of(votes, &mode).mean;
         }
-        Some(Near::of(votes, &mode).found())
+        Near::of(votes, &mode).found()
     }
 }
 
@@ -285,7 +295,7 @@ impl<'a> Near<'a> {
         sum / self.weight
     }
 
-    fn found(&self) -> FoundMode {
+    fn found(&self) -> Option<FoundMode> {
         let variances = LnDeviations {
             frequency: self.mean_of(|m| m.ln_sd.frequency.powi(2)),
             damping: self.mean_of(|m| m.ln_sd.damping.powi(2)),
@@ -297,43 +307,55 @@ impl<'a> Near<'a> {
         let apart = self.mean_of(|m| m.mode.ln_frequency_ratio(&self.mean).powi(2));
         let mut ln_sd = ln_sd.inflated(CI_INFLATION, &MIN_LN_SD);
         ln_sd.frequency = ln_sd.frequency.hypot(SHARE_OF_SPREAD * apart.sqrt());
-        let (pivot_u, pivot_v) = (
-            self.mean_of(|m| m.pivot_px.x),
-            self.mean_of(|m| m.pivot_px.y),
-        );
-        FoundMode {
+        // A place and an angle about it belong together.
+        let by_weight = |a: &&Vote, b: &&Vote| a.weight.total_cmp(&b.weight);
+        let first = self.votes.iter().max_by(by_weight)?.mode;
+        Some(FoundMode {
             mode: BranchMode {
                 mode: self.mean,
                 ln_sd,
             },
             votes: self.weight,
             tracks: self.tracks(),
-            pivot_px: Point2::new(pivot_u, pivot_v),
-            angle: self.mean_of(|m| m.angle),
+            pivot_px: first.pivot_px,
+            angle: first.angle,
             collinearity: self.mean_of(|m| m.share),
-        }
+        })
     }
 
-    /// Points that most of the votes which show them turn.
+    /// Points that most of the votes which show them turn; not those that hardly any shows.
     fn tracks(&self) -> Vec<usize> {
-        let mut balance: Vec<f64> = Vec::new();
+        let (mut shown, mut turned) = (Vec::new(), Vec::new());
         for vote in &self.votes {
-            for &k in &vote.mode.looked_at {
-                if balance.len() <= k {
-                    balance.resize(k + 1, 0.0);
-                }
-                balance[k] -= 0.5 * vote.weight;
-            }
-            for &k in &vote.mode.turned {
-                balance[k] += vote.weight;
+            add(&mut shown, &vote.mode.looked_at, vote.weight);
+            add(&mut turned, &vote.mode.turned, vote.weight);
+        }
+        let mut out = Vec::new();
+        for (k, (turned, shown)) in turned.iter().zip(&shown).enumerate() {
+            if *shown >= MIN_WEIGHT_OF_POINT * self.weight && *turned > 0.5 * shown {
+                out.push(k);
             }
         }
-        let all = 0..balance.len();
-        all.filter(|k| balance[*k] > 0.0).collect()
+        out
+    }
+}
+
+/// Adds a weight to some places, which are in order; there may be new ones among them.
+fn add(sums: &mut Vec<f64>, places: &[usize], weight: f64) {
+    let most = places.last().map_or(0, |last| last + 1);
+    if sums.len() < most {
+        sums.resize(most, 0.0);
+    }
+    for &k in places {
+        sums[k] += weight;
     }
 }
 
 impl FoundMode {
+    fn is_believed(&self) -> bool {
+        self.votes >= MIN_VOTES && self.tracks.len() >= MIN_POINTS
+    }
+
     fn point_mode(&self, branch: Option<usize>, limits: &SearchLimits) -> PointMode {
         let sway = Sway {
             frequency_hz: self.mode.frequency_hz(),

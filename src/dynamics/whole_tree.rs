@@ -43,7 +43,8 @@ pub(super) fn modes_of_tree(
             node: Some(tree.branches[b].node),
         });
     }
-    for mode in found.iter().filter(|mode| mode.is_sure) {
+    let of_no_branch = |mode: &&PointMode| mode.is_sure && mode.branch.is_none();
+    for mode in found.iter().filter(of_no_branch) {
         if !swings.iter().any(|known| is_known(mode, known)) {
             swings.push(Swing {
                 sway: mode.sway,

@@ -121,7 +121,7 @@ pub(super) fn sways(
 }
 
 /// The branch on the foot that most points are on or above.
-fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
+pub(super) fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
     let branches = (1..members.len() as u32).map(NodeId);
     let on_foot = branches.filter(|b| tree.branches[b.index()].parent == Some(NodeId(0)));
     let largest = on_foot.max_by_key(|b| (members[b.index()].len(), std::cmp::Reverse(*b)));

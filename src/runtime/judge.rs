@@ -47,7 +47,7 @@ impl JudgedFilm<'_> {
         CaptureFacts {
             is_filming: self.is_filming,
             amplitude_px: quantile(amplitudes_px, QUIETER),
-            filmed_s: self.length.seconds * (1.0 - shaking.lost_share) - self.left_out_s,
+            filmed_s: (self.length.seconds * (1.0 - shaking.lost_share) - self.left_out_s).max(0.0),
             rate_hz: self.length.rate_hz,
             highest_hz: self.settings.highest_hz,
             points: PointFacts {
