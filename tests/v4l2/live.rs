@@ -106,6 +106,8 @@ fn still(screen: &str) -> String {
         _ if line == "lost nothing" => "lost camera queue".to_owned(),
         // What the film is worth by now hangs on how fast the machine is.
         _ if line.starts_with("Verdict ") => "Verdict".to_owned(),
+        // So does which modes are known by now, and whether all branches have room.
+        _ if line.starts_with("Branches, ") => "Branches,".to_owned(),
         _ => line,
     };
     let is_of_losses = |l: &String| l == "broken unshown";
@@ -127,8 +129,19 @@ fn still(screen: &str) -> String {
             .filter(|v| of_views.iter().any(|l| l.contains(v)))
             .map(str::to_owned),
     );
-    // How many of the branches there is room for is told only where some are left out.
-    lines.join("\n").replace("Branches, of", "Branches,")
+    without_warnings(&mut lines);
+    lines.join("\n")
+}
+
+/// Takes out the warnings before the message of an export: the clip is played again and again, which
+/// is a cut film, and what has been noticed by then hangs on how fast the machine is.
+fn without_warnings(lines: &mut Vec<String>) {
+    let find = |what: &str| lines.iter().position(|l| l.starts_with(what));
+    if let (Some(verdict), Some(written)) = (find("Verdict"), find("capture written"))
+        && verdict < written
+    {
+        lines.drain(verdict + 1..written);
+    }
 }
 
 fn shows(r: &Results, name: &str) -> Result<(), String> {
