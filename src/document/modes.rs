@@ -7,6 +7,7 @@ use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
 use crate::model::{ModeSummary, NodeId, Skeleton, Sway, TreeMode};
 use std::io::{Read, Write};
+use std::ops::Range;
 use std::path::Path;
 
 /// Name of the file.
@@ -32,10 +33,8 @@ const MOTION: &str = "motion_px2";
 /// A table of more modes than this is none of ours: a mode has four points or more.
 const MOST_MODES: usize = 10_000;
 
-/// Squares of motion that a table may have are smaller than this, and those that are written smaller
-/// than that: no tree moves so far.
-const MOST_PX2: f64 = 1e12;
-const LARGEST_PX2: f64 = 1e11;
+/// Squares of motion that are written and read: no tree moves farther.
+const MOTIONS_PX2: Range<f64> = 0.0..1e12;
 
 /// Writes `modes.csv`, the slowest mode first. `energy` names trunk and limbs with their shares of
 /// the mode's kinetic energy, the largest first: `limb_1 0.71; trunk 0.29`; `motion_px2` the nodes
@@ -67,7 +66,7 @@ pub fn modes<W: Write>(out: W, skeleton: &Skeleton, modes: &[TreeMode]) -> Resul
 fn motion(mode: &TreeMode, skeleton: &Skeleton) -> String {
     let mut words = Vec::new();
     let by_node = skeleton.nodes.iter().zip(&mode.motion_px2);
-    for (node, px2) in by_node.filter(|(_, px2)| **px2 < LARGEST_PX2) {
+    for (node, px2) in by_node.filter(|(_, px2)| MOTIONS_PX2.contains(px2)) {
         let px2 = number::text(*px2, 6);
         if !px2.is_empty() && px2 != "0" {
             words.push(format!("{} {px2}", node.name.0));
@@ -178,7 +177,7 @@ impl ModeCells<'_> {
             let (name, px2) = pair.split_once(' ').unwrap_or((pair, ""));
             let node = measured(name, skeleton)?;
             let px2 = px2.parse().ok();
-            let px2 = px2.filter(|x: &f64| (0.0..MOST_PX2).contains(x));
+            let px2 = px2.filter(|x| MOTIONS_PX2.contains(x));
             let px2 = px2.ok_or_else(|| {
                 format!("{MOTION} has {pair:?}, and must have a node and a square of px")
             })?;

@@ -16,7 +16,7 @@ use super::turns::{TurnedPoints, turned_points};
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::NodeId;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{DVector, Point2, Vector2};
 
 /// Rounds of the search.
 const ROUNDS: usize = LAGS_S.len();
@@ -61,8 +61,8 @@ struct Window {
     tracks: Vec<usize>,
     at_px: Vec<Point2<f64>>,
     motions: Motions,
-    /// A small turn of the branch about its base.
-    own_turn: Vec<Vector2<f64>>,
+    /// What of the motions a small turn of the branch about its base is.
+    own_turn: DVector<f64>,
 }
 
 /// The modes near every captured branch; `members` are the points of each and of what it carries.
@@ -134,8 +134,8 @@ impl Window {
         Some(Self {
             tracks: points.tracks,
             at_px,
+            own_turn: motions.sizes_of(&own_turn),
             motions,
-            own_turn,
         })
     }
 
@@ -177,7 +177,7 @@ impl Window {
             return Vec::new();
         };
         let mut starts = starts(&band, poles, band_hz);
-        if let Some(shape) = band.shape_of(&self.motions.sizes_of(&self.own_turn)) {
+        if let Some(shape) = band.shape_of(&self.own_turn) {
             let others: Vec<_> = starts.iter().map(|s| s.shape).collect();
             let frequency_hz = band.peak_hz(&shape, &others);
             starts.push(Start {

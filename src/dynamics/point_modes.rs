@@ -95,10 +95,9 @@ impl PointMode {
     /// Whether an answer's interval and that of the mode have no frequency in common.
     fn contradicts(&self, answer: &Swaying) -> bool {
         let own = &self.sway.frequency_hz;
-        answer.as_ref().is_ok_and(|answer| {
-            let other = &answer.frequency_hz;
-            own.hi < other.lo || other.hi < own.lo
-        })
+        answer
+            .as_ref()
+            .is_ok_and(|answer| !own.overlaps(&answer.frequency_hz))
     }
 
     fn is_of_carrier(&self, carriers: &[Mode]) -> bool {
@@ -117,8 +116,7 @@ impl PointModes {
                 continue;
             }
             let carriers = known_modes(tree.carriers(NodeId(b as u32)), sways);
-            let mut own = self.modes.iter().filter(|mode| mode.branch == Some(b));
-            if let Some(mode) = own.next() {
+            if let Some(mode) = self.own_mode(b) {
                 if mode.is_sure && !mode.is_of_carrier(&carriers) {
                     sways[b] = if mode.contradicts(&sways[b]) {
                         Err(Unidentified::TooUncertain)
@@ -161,7 +159,9 @@ impl PointModes {
                 .chain(tree.carriers(branch))
                 .collect();
             let mut of_carriers = known_modes(carriers.iter().copied(), sways);
-            of_carriers.extend(self.own_modes(&carriers));
+            for carrier in carriers {
+                of_carriers.extend(self.own_mode(carrier.index()).map(|mode| mode.mode));
+            }
             if mode.is_of_carrier(&of_carriers) {
                 continue;
             }
@@ -176,13 +176,9 @@ impl PointModes {
         out
     }
 
-    /// The modes that were looked for in the points of some branches.
-    fn own_modes(&self, branches: &[NodeId]) -> impl Iterator<Item = Mode> {
-        let own = self.modes.iter().filter(|mode| {
-            let branch = mode.branch;
-            branches.iter().any(|b| branch == Some(b.index()))
-        });
-        own.map(|mode| mode.mode)
+    /// The mode that was looked for in the points of captured branch `b`.
+    fn own_mode(&self, b: usize) -> Option<&PointMode> {
+        self.modes.iter().find(|mode| mode.branch == Some(b))
     }
 
     /// The smallest captured branch that has most of a mode's points; `None` where there is none,

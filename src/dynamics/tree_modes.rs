@@ -79,18 +79,16 @@ pub(super) fn point_modes(
         return None;
     }
     local.retain(counts);
-    let mut modes = Vec::new();
-    let fits: Vec<Vec<f64>> = local.iter().map(|m| fits(m, members)).collect();
+    let voters: Vec<Voter> = local.iter().map(|m| Voter::of(m, members)).collect();
+    let of_branches = modes_of_branches(tree, members, &voters);
     let trunk = trunk(tree, members).index();
-    for (branch, found) in modes_of_branches(tree, members, &local, &fits)
-        .iter()
-        .enumerate()
-    {
+    let mut modes = Vec::new();
+    for (branch, found) in of_branches.iter().enumerate() {
         // The trunk's is the fundamental of all points.
         let found = found.as_ref().filter(|_| branch != trunk);
         modes.extend(found.map(|m| m.point_mode(Some(branch), limits)));
     }
-    for found in modes_of_no_branch(&local, &fits) {
+    for found in modes_of_no_branch(&voters) {
         modes.push(found.point_mode(None, limits));
     }
     modes.retain(|m| !limits.may_be_aliased(m.mode.frequency_hz, film));
@@ -107,6 +105,16 @@ fn counts(mode: &LocalMode) -> bool {
         && DAMPING.contains(mode.mode.damping)
         && mode.share > MIN_SHARE
         && mode.turned.len() >= MIN_POINTS
+}
+
+/// A local mode, and the branches that it may vote for.
+struct Voter<'a> {
+    mode: &'a LocalMode,
+    /// By branch: how alike its points and those of the branch are that it shows, 0 to 1; 0 where it
+    /// has no vote.
+    fits: Vec<f64>,
+    /// The largest.
+    best: f64,
 }
 
 /// A local mode, and how much it counts for a branch.
@@ -146,13 +154,11 @@ fn are_told_apart(tree: &BranchTree, members: &[Vec<usize>]) -> Vec<bool> {
 fn modes_of_branches(
     tree: &BranchTree,
     members: &[Vec<usize>],
-    local: &[LocalMode],
-    fits: &[Vec<f64>],
+    voters: &[Voter],
 ) -> Vec<Option<FoundMode>> {
-    let told_apart = are_told_apart(tree, members);
     let mut out: Vec<Option<FoundMode>> = Vec::with_capacity(members.len());
-    for branch in 0..members.len() {
-        if !told_apart[branch] {
+    for (branch, is_told_apart) in are_told_apart(tree, members).into_iter().enumerate() {
+        if !is_told_apart {
             out.push(None);
             continue;
         }
@@ -162,60 +168,64 @@ fn modes_of_branches(
             carriers.extend(found.map(|found| found.mode));
         }
         let mut votes = Vec::new();
-        for (mode, fits) in local.iter().zip(fits) {
-            let (fit, best) = (fits[branch], best(fits));
-            if fit > 0.0
-                && fit >= NEAR_BEST * best
-                && !carriers.iter().any(|c| is_of_carrier(mode, c))
-            {
-                let weight = mode.share * fit;
-                votes.push(Vote { mode, weight });
-            }
+        for voter in voters {
+            let vote = voter.vote(branch);
+            votes.extend(vote.filter(|_| !carriers.iter().any(|c| voter.is_of_carrier(c))));
         }
         out.push(FoundMode::of(&votes).filter(FoundMode::is_believed));
     }
     out
 }
 
-fn best(fits: &[f64]) -> f64 {
-    fits.iter().copied().fold(0.0, f64::max)
-}
-
-/// How alike the points of a mode and those of every branch are that it shows, 0 to 1; 0 where it
-/// has no vote.
-fn fits(mode: &LocalMode, members: &[Vec<usize>]) -> Vec<f64> {
-    let mut out = Vec::with_capacity(members.len());
-    for points in members {
-        let looked_at = count_among(&mode.looked_at, points) as f64;
-        let both = count_among(&mode.turned, points) as f64;
-        let turned = mode.turned.len() as f64;
-        let has_vote = looked_at >= MIN_SHARE_LOOKED_AT * points.len().min(MOST_POINTS) as f64
-            && both >= MIN_POINTS as f64
-            && both >= MIN_SHARE_OF_POINTS * looked_at
-            && both >= MIN_SHARE_OF_POINTS * turned;
-        out.push(if has_vote {
-            both / (looked_at + turned - both)
-        } else {
-            0.0
-        });
+impl<'a> Voter<'a> {
+    fn of(mode: &'a LocalMode, members: &[Vec<usize>]) -> Self {
+        let fits: Vec<f64> = members.iter().map(|points| fit(mode, points)).collect();
+        let best = fits.iter().copied().fold(0.0, f64::max);
+        Self { mode, fits, best }
     }
-    out
+
+    /// For a branch that fits best, or nearly so.
+    fn vote(&self, branch: usize) -> Option<Vote<'a>> {
+        let fit = self.fits[branch];
+        (fit > 0.0 && fit >= NEAR_BEST * self.best).then_some(Vote {
+            mode: self.mode,
+            weight: self.mode.share * fit,
+        })
+    }
+
+    fn is_of_carrier(&self, carrier: &BranchMode) -> bool {
+        let sd = self.mode.ln_sd.frequency.hypot(carrier.ln_sd.frequency);
+        self.mode
+            .mode
+            .has_frequency_of(&carrier.mode, CARRIER_SIGMAS * sd)
+    }
 }
 
-fn is_of_carrier(mode: &LocalMode, carrier: &BranchMode) -> bool {
-    let sd = mode.ln_sd.frequency.hypot(carrier.ln_sd.frequency);
-    mode.mode
-        .has_frequency_of(&carrier.mode, CARRIER_SIGMAS * sd)
+/// How alike the points of a mode and those `points` of a branch are that it shows, 0 to 1; 0 where
+/// it has no vote.
+fn fit(mode: &LocalMode, points: &[usize]) -> f64 {
+    let looked_at = count_among(&mode.looked_at, points) as f64;
+    let both = count_among(&mode.turned, points) as f64;
+    let turned = mode.turned.len() as f64;
+    let has_vote = looked_at >= MIN_SHARE_LOOKED_AT * points.len().min(MOST_POINTS) as f64
+        && both >= MIN_POINTS as f64
+        && both >= MIN_SHARE_OF_POINTS * looked_at
+        && both >= MIN_SHARE_OF_POINTS * turned;
+    if has_vote {
+        both / (looked_at + turned - both)
+    } else {
+        0.0
+    }
 }
 
 /// Modes of points that are no captured branch's, those with most votes first.
-fn modes_of_no_branch(local: &[LocalMode], fits: &[Vec<f64>]) -> Vec<FoundMode> {
+fn modes_of_no_branch(voters: &[Voter]) -> Vec<FoundMode> {
     let mut votes: Vec<Vote> = Vec::new();
-    for (mode, fits) in local.iter().zip(fits) {
-        if best(fits) == 0.0 {
-            let weight = mode.share;
-            votes.push(Vote { mode, weight });
-        }
+    for voter in voters.iter().filter(|voter| voter.best == 0.0) {
+        votes.push(Vote {
+            mode: voter.mode,
+            weight: voter.mode.share,
+        });
     }
     votes.sort_by(|a, b| {
         let [a, b] = [a, b].map(|v| v.weight * v.mode.turned.len() as f64);
@@ -259,6 +269,30 @@ impl FoundMode {
             mode = Near::of(votes, &mode).mean;
         }
         Near::of(votes, &mode).found()
+    }
+
+    fn is_believed(&self) -> bool {
+        self.votes >= MIN_VOTES && self.tracks.len() >= MIN_POINTS
+    }
+
+    fn point_mode(&self, branch: Option<usize>, limits: &SearchLimits) -> PointMode {
+        let sway = Sway {
+            frequency_hz: self.mode.frequency_hz(),
+            damping_ratio: self.mode.damping_ratio(),
+            excitation: Excitation::Wind,
+            amplitude_deg: (SQRT_2 * self.angle).to_degrees(),
+        };
+        PointMode {
+            mode: self.mode.mode,
+            branch,
+            tracks: self.tracks.clone(),
+            clearness: self.votes,
+            same_within: SAME_SIGMAS * self.mode.ln_sd.frequency,
+            sway,
+            is_sure: self.mode.is_within(limits.max_relative_ci),
+            collinearity: self.collinearity,
+            pivot_px: self.pivot_px,
+        }
     }
 }
 
@@ -308,8 +342,8 @@ impl<'a> Near<'a> {
         let mut ln_sd = ln_sd.inflated(CI_INFLATION, &MIN_LN_SD);
         ln_sd.frequency = ln_sd.frequency.hypot(SHARE_OF_SPREAD * apart.sqrt());
         // A place and an angle about it belong together.
-        let by_weight = |a: &&Vote, b: &&Vote| a.weight.total_cmp(&b.weight);
-        let first = self.votes.iter().max_by(by_weight)?.mode;
+        let votes = self.votes.iter();
+        let first = votes.max_by(|a, b| a.weight.total_cmp(&b.weight))?.mode;
         Some(FoundMode {
             mode: BranchMode {
                 mode: self.mean,
@@ -348,32 +382,6 @@ fn add(sums: &mut Vec<f64>, places: &[usize], weight: f64) {
     }
     for &k in places {
         sums[k] += weight;
-    }
-}
-
-impl FoundMode {
-    fn is_believed(&self) -> bool {
-        self.votes >= MIN_VOTES && self.tracks.len() >= MIN_POINTS
-    }
-
-    fn point_mode(&self, branch: Option<usize>, limits: &SearchLimits) -> PointMode {
-        let sway = Sway {
-            frequency_hz: self.mode.frequency_hz(),
-            damping_ratio: self.mode.damping_ratio(),
-            excitation: Excitation::Wind,
-            amplitude_deg: (SQRT_2 * self.angle).to_degrees(),
-        };
-        PointMode {
-            mode: self.mode.mode,
-            branch,
-            tracks: self.tracks.clone(),
-            clearness: self.votes,
-            same_within: SAME_SIGMAS * self.mode.ln_sd.frequency,
-            sway,
-            is_sure: self.mode.is_within(limits.max_relative_ci),
-            collinearity: self.collinearity,
-            pivot_px: self.pivot_px,
-        }
     }
 }
 

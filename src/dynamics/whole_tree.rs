@@ -43,9 +43,9 @@ pub(super) fn modes_of_tree(
             node: Some(tree.branches[b].node),
         });
     }
-    let of_no_branch = |mode: &&PointMode| mode.is_sure && mode.branch.is_none();
-    for mode in found.iter().filter(of_no_branch) {
-        if !swings.iter().any(|known| is_known(mode, known)) {
+    for mode in found {
+        let is_of_no_branch = mode.is_sure && mode.branch.is_none();
+        if is_of_no_branch && !swings.iter().any(|known| is_known(mode, known)) {
             swings.push(Swing {
                 sway: mode.sway,
                 tracks: &mode.tracks,

@@ -4,7 +4,7 @@ use crate::document::{CaptureNote, Columns};
 use crate::dynamics::angle_to_parent_deg;
 use crate::model::{
     BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, ModeSummary, NodeId, Participation, Pose,
-    Skeleton, Swaying, TreeMode, UserNotes, participation, reason,
+    Skeleton, Swaying, TreeMode, UserNotes, moves_with, reason,
 };
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -157,11 +157,10 @@ impl Facts<'_> {
         let moves = node.parent.is_some() && node.moves_with.is_none();
         let measured = moves && node.copy_of.is_none();
         let sway = self.sway.of_nodes.get(i);
-        let unknown = sway.and_then(|s| s.err()).filter(|_| measured);
-        let participation = match unknown {
-            Some(_) => participation(self.sway.modes, self.botanical, id),
-            None => Vec::new(),
-        };
+        let answer = sway.filter(|_| measured);
+        let participation = answer.map_or(Vec::new(), |sway| {
+            moves_with(sway, self.sway.modes, self.botanical, id)
+        });
         Branch {
             id: node.name.0,
             name: self.botanical.piece_name(id),
@@ -174,7 +173,9 @@ impl Facts<'_> {
             n_tracks: node.n_tracks,
             end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
             sway: sway.filter(|s| s.is_ok()).map(Columns::of),
-            why: unknown.map(|why| reason(why, &participation)),
+            why: answer
+                .and_then(|s| s.err())
+                .map(|why| reason(why, &participation)),
             participation,
             angle_deg: measured
                 .then(|| packed(&angle_to_parent_deg(self.skeleton, self.poses, id))),

@@ -1,6 +1,6 @@
 //! What a model's file says of a branch's sway.
 
-use crate::model::{NodeId, Skeleton, Swaying, TreeMode, participation};
+use crate::model::{NodeId, Skeleton, Swaying, TreeMode, moves_with};
 use serde_json::{Map, Value, json};
 
 /// For the `extras` of the joints of a tree, by node index: what is known of each one's sway, and
@@ -10,10 +10,7 @@ pub fn joint_extras(skeleton: &Skeleton, sway: &[Swaying], modes: &[TreeMode]) -
     let mut all = Vec::with_capacity(sway.len());
     for (node, sway) in (0..).map(NodeId).zip(sway) {
         let mut own = extras(sway);
-        let moves_with = match sway {
-            Ok(_) => Vec::new(),
-            Err(_) => participation(modes, &branches, node),
-        };
+        let moves_with = moves_with(sway, modes, &branches, node);
         if !moves_with.is_empty() {
             own["participation"] = json!(moves_with);
         }

@@ -52,7 +52,7 @@ pub use mode_summary::ModeSummary;
 pub use moving_branch::MovingBranch;
 pub use origin::Origin;
 pub use outline::{Outline, bounds_px};
-pub use participation::{Participation, participation, reason};
+pub use participation::{Participation, moves_with, participation, reason};
 pub use pose::{JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot, StillNeeded};

@@ -1,6 +1,6 @@
 //! With which modes of the tree a branch moves, and how much.
 
-use super::{BotanicalBranches, NodeId, TreeMode, Unidentified};
+use super::{BotanicalBranches, NodeId, Swaying, TreeMode, Unidentified};
 use serde::Serialize;
 use std::fmt;
 
@@ -49,6 +49,19 @@ pub fn participation(
     }
     out.sort_by(|a, b| b.share.total_cmp(&a.share));
     out
+}
+
+/// The same for a branch without a frequency of its own; none for one that has one.
+pub fn moves_with(
+    swaying: &Swaying,
+    modes: &[TreeMode],
+    branches: &BotanicalBranches,
+    node: NodeId,
+) -> Vec<Participation> {
+    match swaying {
+        Ok(_) => Vec::new(),
+        Err(_) => participation(modes, branches, node),
+    }
 }
 
 /// Why a branch has no frequency of its own, and with which modes it moves: `no mode of its own:

@@ -18,6 +18,11 @@ impl Interval {
     pub fn holds(&self, x: f64) -> bool {
         self.lo <= x && x <= self.hi
     }
+
+    /// Whether some value is in both.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.lo <= other.hi && other.lo <= self.hi
+    }
 }
 
 /// What made the tree sway.

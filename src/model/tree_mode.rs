@@ -39,22 +39,14 @@ impl TreeMode {
         self.motion_px2.get(node.index()).copied().unwrap_or(0.0)
     }
 
-    /// Share of its kinetic energy that is in the points on a node, all points of like mass.
-    pub fn energy(&self, node: NodeId) -> f64 {
-        let all: f64 = self.motion_px2.iter().sum();
-        if all > 0.0 {
-            self.motion_px2(node) / all
-        } else {
-            0.0
-        }
-    }
-
-    /// Shares of its energy in trunk and limbs, the largest first; without those that are hardly
-    /// any.
+    /// Shares of its kinetic energy in trunk and limbs, all points of like mass, the largest first;
+    /// without those that are hardly any.
     pub fn energy_by_limb(&self, branches: &BotanicalBranches) -> Vec<LimbEnergy> {
+        let all: f64 = self.motion_px2.iter().sum();
         let mut by_limb: BTreeMap<usize, f64> = BTreeMap::new();
-        for node in (0..self.motion_px2.len() as u32).map(NodeId) {
-            *by_limb.entry(branches.limb(node)).or_default() += self.energy(node);
+        for (node, px2) in (0..).map(NodeId).zip(&self.motion_px2) {
+            // Without motion it is no number, and no share is large enough.
+            *by_limb.entry(branches.limb(node)).or_default() += px2 / all;
         }
         let mut shares: Vec<LimbEnergy> = Vec::with_capacity(by_limb.len());
         for (limb, share) in by_limb {

@@ -7,7 +7,7 @@ use crate::config::Dynamics;
 use crate::dynamics::{Depth, Film, Take, analyse, spectrum};
 use crate::model::{
     AngleSpectrum, Angles, BranchSway, ModeSummary, NodeId, NodeName, Skeleton, SwayNow, TrackId,
-    TrackLog, participation,
+    TrackLog, moves_with,
 };
 use crate::solve::Model;
 use std::collections::BTreeMap;
@@ -119,10 +119,7 @@ impl SwayJob {
             if self.angles.nodes.contains(&node.name) {
                 let sway = BranchSway {
                     swaying: *swaying,
-                    moves_with: match swaying {
-                        Ok(_) => Vec::new(),
-                        Err(_) => participation(&analysis.modes, &botanical, id),
-                    },
+                    moves_with: moves_with(swaying, &analysis.modes, &botanical, id),
                     spectrum: self.spectrum_of(node.name),
                 };
                 branches.insert(node.name, sway);

@@ -169,7 +169,8 @@ mod tests {
         }
     }
 
-    fn line_with(sway: &SwayNow) -> Value {
+    /// The line of a tree without a node.
+    fn line_with(beside: &Beside) -> Value {
         let skeleton = Skeleton {
             nodes: Vec::new(),
             foot_px: Point2::origin(),
@@ -180,11 +181,7 @@ mod tests {
             time_s: 11.0,
             joints: Vec::new(),
         };
-        let beside = Beside {
-            sway: Some(sway),
-            ..Beside::default()
-        };
-        serde_json::from_str(&line(&pose, &skeleton, 0.0, &beside)).expect("json")
+        serde_json::from_str(&line(&pose, &skeleton, 0.0, beside)).expect("json")
     }
 
     /// A tree of very many modes makes no line that is longer without end.
@@ -222,7 +219,10 @@ mod tests {
         let branch = sway.branches.get_mut(&NodeName(4)).expect("branch");
         branch.moves_with = vec![moves_with; 9];
         sway.modes = vec![mode; 999];
-        let told = &line_with(&sway)["sway"];
+        let told = &line_with(&Beside {
+            sway: Some(&sway),
+            ..Beside::default()
+        })["sway"];
         let modes = told["modes"].as_array().expect("modes");
         assert_eq!(modes.len(), MOST_MODES);
         assert_eq!(modes[0]["branch"], "limb_1");
@@ -256,21 +256,8 @@ mod tests {
             (4, known(None, f64::NAN)),
             (9, Err(Unidentified::AboveSampling)),
         ]);
-        let skeleton = Skeleton {
-            nodes: Vec::new(),
-            foot_px: Point2::origin(),
-            image_size: Size::new(64, 64),
-        };
-        let pose = Pose {
-            frame: 330,
-            time_s: 11.0,
-            joints: Vec::new(),
-        };
         let shared = Shared::default();
-        let of = |beside: Beside| -> Value {
-            serde_json::from_str(&line(&pose, &skeleton, 0.0, &beside)).unwrap()
-        };
-        let told = &of(Beside {
+        let told = &line_with(&Beside {
             sway: Some(&sway),
             verdict: Some(&Verdict {
                 grade: Grade::Fair,
@@ -299,7 +286,7 @@ mod tests {
             ])
         );
         assert_eq!(
-            of(Beside::default()),
+            line_with(&Beside::default()),
             json!({"frame": 330, "time_s": 11.0, "nodes": []})
         );
     }
