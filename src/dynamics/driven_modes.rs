@@ -17,7 +17,7 @@ use std::f64::consts::{PI, TAU};
 /// Motions that the likelihood is of.
 pub(super) const MOTIONS: usize = 6;
 /// Power of gusts falls with frequency by this exponent (Kolmogorov 1941).
-const GUST_EXPONENT: f64 = -5.0 / 3.0;
+pub(super) const GUST_EXPONENT: f64 = -5.0 / 3.0;
 /// Of Schwarz's penalty this share is asked of a mode: modes near each other would be one by all of
 /// it. Found on made films (docs/design/sway.md).
 const PENALTY_SHARE: f64 = 0.5;

@@ -3,6 +3,7 @@
 mod ambient;
 mod angle;
 mod branch_tree;
+mod branch_turns;
 mod branches;
 mod celerite;
 mod decay;
@@ -31,6 +32,7 @@ mod sway;
 mod swing;
 mod takes;
 mod tree_modes;
+mod turn_spectrum;
 mod turns;
 mod whole_tree;
 mod wind;

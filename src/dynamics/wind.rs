@@ -8,6 +8,7 @@
 
 use super::ambient;
 use super::branch_tree::BranchTree;
+use super::branch_turns::turn_of;
 use super::branches::{
     BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
     from_the_trunk_up,
@@ -20,6 +21,7 @@ use super::gap_free::GapFree;
 use super::members::{Points, mean_px};
 use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
+use super::turn_spectrum::slowest_oscillator;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
@@ -59,6 +61,8 @@ const CI_INFLATION: f64 = 1.1;
 /// A mode whose interval is so many times wider than is asked for is no answer, but serves to tell
 /// those of the branches on it.
 const MAX_CI_TO_SERVE: f64 = 2.0;
+/// The trunk's is an answer up to so many times.
+const MAX_CI_OF_TRUNK: f64 = 4.0;
 
 /// What is asked of an answer, by the points that it comes from. Found on made-up trees
 /// (tests/sway_trees.rs).
@@ -160,12 +164,13 @@ struct Speaking {
 
 impl BranchEstimator for InWind<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
-        let told = self.by_own_points(branch);
-        if branch.node == self.trunk {
-            self.or_fundamental(branch, told)
-        } else {
-            told
+        if branch.node == self.trunk
+            && let Some((mode, sway)) = self.fundamental
+        {
+            self.known[branch.node.index()] = Known::Mode(mode);
+            return Ok(sway);
         }
+        self.by_own_points(branch)
     }
 }
 
@@ -203,33 +208,23 @@ impl InWind<'_> {
 }
 
 impl InWind<'_> {
-    /// The trunk's sway: `told`, if all points at once tell the same or nothing. The trunk's own
-    /// points tell it more exactly, but where they are few a limb's sway is taken for its own.
-    fn or_fundamental(&mut self, branch: &BranchInFilm, told: Swaying) -> Swaying {
-        let Some((mode, sway)) = self.fundamental else {
-            return told;
-        };
-        if let (Ok(_), Known::Mode(own)) = (&told, self.known[branch.node.index()])
-            && is_of_ancestor(&own, &[mode])
-        {
-            return told;
-        }
-        self.known[branch.node.index()] = Known::Mode(mode);
-        Ok(sway)
-    }
-
     /// The sway of the whole tree from all points at once; `None` where these do not tell it. It is
-    /// the one answer that every film should give, and may be twice as uncertain as others.
+    /// the one answer that every film should give, and as uncertain as it must be.
     fn whole_tree(&self) -> Option<(BranchMode, Sway)> {
         let tracks = self.members.get(self.trunk.index())?;
         let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
         let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
         let frames = self.sampling.frames_with(&[&points]).ok()?;
+        if points.rms_px() < NOISE_PX {
+            return None;
+        }
         let within_hz = self.sampling.frequencies_hz;
-        let found = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
-        let found = found.filter(|o| !o.at_limit)?;
+        let by_modes = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
+        let by_modes = by_modes.filter(|o| !o.at_limit);
+        let by_turn = self.by_turn_of_trunk(&points, &frames);
+        let found = together(by_modes, by_turn)?;
         let mode = OWN_POINTS.mode_of(found.mode, &found.ln_sd);
-        if !mode.is_within(MAX_CI_TO_SERVE * self.limits.max_relative_ci)
+        if !mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci)
             || self
                 .limits
                 .may_be_aliased(mode.mode.frequency_hz, self.film)
@@ -243,6 +238,21 @@ impl InWind<'_> {
             amplitude_deg: self.amplitude_deg(base_px, &points, found.variance),
         };
         Some((mode, sway))
+    }
+
+    /// The slowest of the larger oscillators in the trunk's turn.
+    fn by_turn_of_trunk(&self, points: &Points, frames: &[Vec<usize>]) -> Option<Oscillator> {
+        let angles = turn_of(self.trunk, self.tree, self.film, frames)?;
+        let mut times_s = Vec::with_capacity(frames.len());
+        for frame in frames {
+            times_s.push(self.film.mean_s(frame));
+        }
+        let within_hz = self.sampling.frequencies_hz;
+        let mut found = slowest_oscillator(&angles, &times_s, within_hz, self.cancel)?;
+        // From the square of an angle to that of all points' motion.
+        let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
+        found.variance *= self.arms_px2(base_px, points);
+        (!found.at_limit).then_some(found)
     }
 
     /// Those of a branch's points that are on none of the branches that it carries, if they are
@@ -350,12 +360,18 @@ impl InWind<'_> {
 
     /// Of an oscillator of this variance in all of the points together, px².
     fn amplitude_deg(&self, base_px: Point2<f64>, points: &Points, variance: f64) -> f64 {
-        let mut arms = 0.0;
+        let arms_px2 = self.arms_px2(base_px, points);
+        (2.0 * variance).sqrt().atan2(arms_px2.sqrt()).to_degrees()
+    }
+
+    /// Sum of the squares of the distances of some points from a place.
+    fn arms_px2(&self, base_px: Point2<f64>, points: &Points) -> f64 {
+        let mut sum = 0.0;
         for &k in &points.tracks {
             let at_px = mean_px(&self.film.tracks[k].at_px);
-            arms += (at_px - base_px).norm_squared();
+            sum += (at_px - base_px).norm_squared();
         }
-        (2.0 * variance).sqrt().atan2(arms.sqrt()).to_degrees()
+        sum
     }
 }
 
@@ -435,6 +451,37 @@ impl OwnMotion {
         }
         Ok(())
     }
+}
+
+/// What two ways to one oscillator say together. Where they contradict each other the turn is right
+/// more often (docs/design/sway.md). Both are of one film: their mean is no surer than either.
+fn together(by_modes: Option<Oscillator>, by_turn: Option<Oscillator>) -> Option<Oscillator> {
+    let (by_modes, by_turn) = match (by_modes, by_turn) {
+        (Some(by_modes), Some(by_turn)) => (by_modes, by_turn),
+        (by_modes, by_turn) => return by_turn.or(by_modes),
+    };
+    let [a, b] = [&by_modes, &by_turn].map(|o| o.ln_sd.frequency);
+    if !by_modes
+        .mode
+        .has_frequency_of(&by_turn.mode, SAME_FREQ_SIGMAS * a.hypot(b))
+    {
+        return Some(by_turn);
+    }
+    let weights = [a, b].map(|sd| sd.max(f64::MIN_POSITIVE).powi(-2));
+    let share = weights[0] / (weights[0] + weights[1]);
+    let between = |a: f64, b: f64| a.powf(share) * b.powf(1.0 - share);
+    Some(Oscillator {
+        mode: Mode {
+            frequency_hz: between(by_modes.mode.frequency_hz, by_turn.mode.frequency_hz),
+            damping: between(by_modes.mode.damping, by_turn.mode.damping),
+        },
+        ln_sd: LnDeviations {
+            frequency: (2.0 / (weights[0] + weights[1])).sqrt(),
+            damping: between(by_modes.ln_sd.damping, by_turn.ln_sd.damping),
+        },
+        variance: between(by_modes.variance, by_turn.variance),
+        at_limit: false,
+    })
 }
 
 /// Root of the mean square displacement of a point.
