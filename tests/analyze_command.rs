@@ -304,6 +304,7 @@ fn without_a_second(text: &str) -> String {
 fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
     let (_dir, dir) = captured("tree");
     change_points(&dir, without_a_second);
+    let before_s = number(&note(&dir)["judged_by"]["filmed_s"]);
     let cut = analyze(&[&dir], &["--json", "--update"]);
     let said = String::from_utf8_lossy(&cut.stderr).into_owned();
     assert!(
@@ -322,6 +323,9 @@ fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
         "{reasons}"
     );
     assert!((number(&note["judged_by"]["cut_at_s"]) - 4.0).abs() < 0.05);
+    // The part that is not used does not count as filmed.
+    let filmed_s = number(&note["judged_by"]["filmed_s"]);
+    assert!(filmed_s < before_s - 3.0, "{filmed_s} of {before_s} s");
     // A part that the user chooses is in one piece; of the film it stays known.
     let part = analyze(&[&dir], &["--to", "3.9", "--update"]);
     let said = String::from_utf8_lossy(&part.stderr).into_owned();
@@ -331,6 +335,7 @@ fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
             .to_string()
             .contains("film cut")
     );
+    assert_eq!(number(&self::note(&dir)["judged_by"]["filmed_s"]), filmed_s);
 }
 
 #[test]

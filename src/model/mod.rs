@@ -39,7 +39,7 @@ mod wood;
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
-pub use capture_facts::{CaptureFacts, PointFacts, Shake, SwayFacts};
+pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use foot::{Foot, FootBasis};
 pub use frame::{
