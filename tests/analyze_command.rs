@@ -165,6 +165,13 @@ fn the_answers_stand_in_the_table_in_json_and_in_the_capture() {
     );
     assert!((number(&trunk["spectrum_peak_hz"]) - 0.7).abs() < 0.1);
     assert!(number(&trunk["half_power_damping"]) > number(&trunk["damping_ratio"]["value"]));
+    let dominant = &capture["dominant_peaks"];
+    let resolution_hz = number(&dominant["resolution_hz"]);
+    assert!((0.05..0.2).contains(&resolution_hz), "{dominant}");
+    let of_trunk = &dominant["levels"][0]["peaks"][0]["frequency_hz"];
+    assert!((number(of_trunk) - 0.7).abs() < resolution_hz, "{dominant}");
+    let common = dominant["common"].as_array().expect("common peaks");
+    assert_eq!(common.is_empty(), dominant["why"].is_string(), "{dominant}");
     for branch in branches(&told) {
         let sound = branch["identifiable"] == branch["unidentified"].is_null();
         assert!(
@@ -304,6 +311,7 @@ fn without_a_second(text: &str) -> String {
 fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
     let (_dir, dir) = captured("tree");
     change_points(&dir, without_a_second);
+    let before_s = number(&note(&dir)["judged_by"]["filmed_s"]);
     let cut = analyze(&[&dir], &["--json", "--update"]);
     let said = String::from_utf8_lossy(&cut.stderr).into_owned();
     assert!(
@@ -322,6 +330,9 @@ fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
         "{reasons}"
     );
     assert!((number(&note["judged_by"]["cut_at_s"]) - 4.0).abs() < 0.05);
+    // The part that is not used does not count as filmed.
+    let filmed_s = number(&note["judged_by"]["filmed_s"]);
+    assert!(filmed_s < before_s - 3.0, "{filmed_s} of {before_s} s");
     // A part that the user chooses is in one piece; of the film it stays known.
     let part = analyze(&[&dir], &["--to", "3.9", "--update"]);
     let said = String::from_utf8_lossy(&part.stderr).into_owned();
@@ -331,6 +342,7 @@ fn a_film_that_is_cut_is_analysed_up_to_there_and_the_user_is_warned() {
             .to_string()
             .contains("film cut")
     );
+    assert_eq!(number(&self::note(&dir)["judged_by"]["filmed_s"]), filmed_s);
 }
 
 #[test]
@@ -679,6 +691,8 @@ fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
         "m in a pixel",
         "What this does not say",
         "How to read this",
+        "Dominant peaks across levels",
+        "dominant peak common to levels 1 to 3",
     ] {
         assert!(html.contains(what), "the page lacks {what:?}");
     }
@@ -727,6 +741,9 @@ fn what_a_capture_lacks_is_told_and_it_is_analysed_with_the_rest() {
             && told.contains("the picture of the capture is left out"),
         "{told}"
     );
+    let printed = String::from_utf8_lossy(&output.stdout);
+    let peaks = "dominant peak common to levels 1 to 3: none: there are no poses";
+    assert!(printed.contains(peaks), "{printed}");
     let text = fs::read_to_string(dir.join("nodes.csv")).expect("nodes");
     assert!(text.contains(",true,release,"), "{text}");
     assert!(!dir.join("tree.glb").exists());

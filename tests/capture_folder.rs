@@ -366,7 +366,7 @@ fn the_modes_of_the_tree_hold_those_of_its_branches() {
             assert!(index(node) > 0 && number(px2) > 0.0, "{row:?}");
         }
     }
-    let nodes = made().rows("nodes.csv", arborcam::document::NODES_HEADER);
+    let nodes = made().rows("nodes.csv", &arborcam::document::nodes_header());
     let mut known: Vec<u32> = nodes
         .iter()
         .filter(|row| row[16] == "true" && row[20] != "copy")

@@ -13,7 +13,7 @@ use crate::document::{Document, DocumentError};
 use crate::dynamics::{Depth, Film, Take, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
-use crate::model::{Excitation, Pose, Skeleton, Swaying, TreeMode};
+use crate::model::{Excitation, FilmCut, Pose, Skeleton, Swaying, TreeMode};
 use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
 use crate::tui::columns;
 use crate::views::{SwayFound, update};
@@ -41,8 +41,7 @@ struct Found {
     sway: Vec<Swaying>,
     /// Those of the whole tree.
     modes: Vec<TreeMode>,
-    /// Where its film is cut, s.
-    cut_at_s: Option<f64>,
+    cut: Option<FilmCut>,
 }
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
@@ -71,7 +70,7 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
             let found = SwayFound {
                 sway: &found.sway,
                 modes: &found.modes,
-                cut_at_s: found.cut_at_s,
+                cut: found.cut,
             };
             failures.extend(update(dir, found, stop).err().map(CommandError::from));
         }
@@ -217,9 +216,9 @@ fn analyse_capture(
         .flat_map(|o| &o.polygon_px)
         .map(|p| Point2::from(*p))
         .collect();
-    let cut_at_s = take.first_cut_s();
+    let cut = take.cut();
     let note = &document.note;
-    let renewed = note.judgement_with(&skeleton, &analysis.sway, cut_at_s);
+    let renewed = note.judgement_with(&skeleton, &analysis.sway, cut);
     let renewed = renewed.filter(|_| args.update).map(|j| j.verdict);
     let study = Study::of(&Given {
         name,
@@ -241,7 +240,7 @@ fn analyse_capture(
         found: Found {
             modes: analysis.modes,
             sway: with_amplitudes(&skeleton, analysis.sway, &study),
-            cut_at_s,
+            cut,
         },
         study,
     })

@@ -2,32 +2,33 @@
 
 use super::error::DocumentError;
 use super::number;
-use super::sway::{self, Columns};
+use super::sway;
 use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
-use crate::model::{ModeSummary, NodeId, Skeleton, Sway, TreeMode};
+use crate::model::{ModeSummary, NodeId, Skeleton, Sway, SwayColumns, TreeMode};
 use std::io::{Read, Write};
 use std::ops::Range;
 use std::path::Path;
 
 /// Name of the file.
 pub const MODES_FILE: &str = "modes.csv";
-const HEADER: &str = "mode,frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,\
-damping_hi,excitation,amplitude_deg,collinearity,n_points,node_id,branch,energy,motion_px2";
-/// The columns that are read; `branch` and `energy` follow from them.
-const COLUMNS: [&str; 11] = [
-    "frequency_hz",
-    "frequency_lo_hz",
-    "frequency_hi_hz",
-    "damping_ratio",
-    "damping_lo",
-    "damping_hi",
-    "excitation",
-    "amplitude_deg",
-    "collinearity",
-    "n_points",
-    "node_id",
-];
+/// The columns that are read, first [`SwayColumns::NAMES`]; `branch` and `energy` follow from them.
+const COLUMNS: [&str; 11] = {
+    let [f, f_lo, f_hi, d, d_lo, d_hi] = SwayColumns::NAMES;
+    [
+        f,
+        f_lo,
+        f_hi,
+        d,
+        d_lo,
+        d_hi,
+        "excitation",
+        "amplitude_deg",
+        "collinearity",
+        "n_points",
+        "node_id",
+    ]
+};
 /// A file that was written before there was this column lacks it.
 const MOTION: &str = "motion_px2";
 /// A table of more modes than this is none of ours: a mode has four points or more.
@@ -36,6 +37,11 @@ const MOST_MODES: usize = 10_000;
 /// Squares of motion that are written and read: no tree moves farther.
 const MOTIONS_PX2: Range<f64> = 0.0..1e12;
 
+/// The first line of `modes.csv`.
+fn header() -> String {
+    format!("mode,{},branch,energy,{MOTION}", COLUMNS.join(","))
+}
+
 /// Writes `modes.csv`, the slowest mode first. `energy` names trunk and limbs with their shares of
 /// the mode's kinetic energy, the largest first: `limb_1 0.71; trunk 0.29`; `motion_px2` the nodes
 /// by their numbers, with the squares of the swing of the points on them: `3 12.5; 7 0.41`.
@@ -43,10 +49,10 @@ const MOTIONS_PX2: Range<f64> = 0.0..1e12;
 /// # Errors
 /// The file cannot be written.
 pub fn modes<W: Write>(out: W, skeleton: &Skeleton, modes: &[TreeMode]) -> Result<W, WriteError> {
-    let mut table = TableWriter::new(MODES_FILE, HEADER, out)?;
+    let mut table = TableWriter::new(MODES_FILE, &header(), out)?;
     for (mode, summary) in modes.iter().zip(ModeSummary::all(modes, skeleton)) {
         table.count(summary.mode as u64);
-        for value in Columns::of(&Ok(summary.sway)).values() {
+        for value in SwayColumns::of(Some(&summary.sway)).values() {
             table.number(value, 5);
         }
         table.text(summary.sway.excitation.word());
@@ -204,39 +210,13 @@ fn measured(name: &str, skeleton: &Skeleton) -> Result<Option<NodeId>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Excitation, Interval, Node, Size, Sway};
+    use crate::model::{Excitation, Interval, Sway};
 
     fn interval(value: f64) -> Interval {
         Interval {
             value,
             lo: (0.98e5 * value).round() / 1e5,
             hi: (1.02e5 * value).round() / 1e5,
-        }
-    }
-
-    /// A trunk that forks into two limbs.
-    fn forked() -> Skeleton {
-        let at = [
-            [0.0, 0.0, 0.0],
-            [0.0, 100.0, 0.0],
-            [-40.0, 160.0, 0.0],
-            [5.0, 190.0, 0.0],
-        ];
-        let parents = [None, Some(0), Some(1), Some(1)];
-        let mut nodes = Vec::new();
-        for (i, (at, parent)) in at.into_iter().zip(parents).enumerate() {
-            nodes.push(Node {
-                level: [0, 1, 2, 2][i],
-                ..Node::made_up(i as u32, parent, at)
-            });
-        }
-        Skeleton {
-            nodes,
-            foot_px: [320.0, 300.0].into(),
-            image_size: Size {
-                width: 640,
-                height: 360,
-            },
         }
     }
 
@@ -265,13 +245,17 @@ mod tests {
 
     #[test]
     fn a_mode_is_a_row_with_the_energy_of_the_limbs() {
-        let text = modes(Vec::new(), &forked(), &two_modes()).expect("written");
+        let text = modes(Vec::new(), &Skeleton::forked(), &two_modes()).expect("written");
         let text = String::from_utf8(text).expect("text");
         let rows: Vec<&str> = text.lines().collect();
-        assert_eq!(rows[0], HEADER);
+        assert_eq!(
+            rows[0],
+            "mode,frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,\
+             excitation,amplitude_deg,collinearity,n_points,node_id,branch,energy,motion_px2"
+        );
         assert_eq!(
             rows[1],
-            "1,0.7,0.686,0.714,0.04,0.0392,0.0408,wind,2.5,0.97,9,2,limb_1,limb_1 0.75; trunk 0.25,1 25; 2 75"
+            "1,0.7,0.686,0.714,0.04,0.0392,0.0408,wind,2.5,0.97,9,12,limb_1,limb_1 0.75; trunk 0.25,11 25; 12 75"
         );
         assert_eq!(
             rows[2],
@@ -282,7 +266,7 @@ mod tests {
     /// Twice: what is written is what was read.
     #[test]
     fn a_table_is_read_back_as_it_was_written() {
-        let skeleton = forked();
+        let skeleton = Skeleton::forked();
         let text = modes(Vec::new(), &skeleton, &two_modes()).expect("written");
         let back = read_from(&text, &skeleton).expect("read");
         assert_eq!(back, two_modes());
@@ -294,7 +278,7 @@ mod tests {
         let old = "frequency_hz,frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,\
                    excitation,amplitude_deg,collinearity,n_points,node_id\n\
                    0.7,0.69,0.71,,,,release,,,5,\n";
-        let back = read_from(old.as_bytes(), &forked()).expect("read");
+        let back = read_from(old.as_bytes(), &Skeleton::forked()).expect("read");
         assert_eq!(back.len(), 1);
         assert_eq!((back[0].points, back[0].node), (5, None));
         assert!(back[0].sway.damping_ratio.is_none() && back[0].motion_px2.is_empty());
@@ -302,8 +286,8 @@ mod tests {
 
     #[test]
     fn the_branch_of_a_node_that_was_cut_out_is_lacked() {
-        let text = modes(Vec::new(), &forked(), &two_modes()).expect("written");
-        let mut cut = forked();
+        let text = modes(Vec::new(), &Skeleton::forked(), &two_modes()).expect("written");
+        let mut cut = Skeleton::forked();
         cut.nodes.truncate(2);
         let back = read_from(&text, &cut).expect("read");
         assert_eq!(back[0].node, None);
@@ -312,20 +296,26 @@ mod tests {
 
     #[test]
     fn a_damaged_table_is_refused_with_its_line() {
-        let good = "1,0.7,0.6,0.8,0.04,0.03,0.05,wind,2.5,0.97,9,2,limb_1,limb_1 1.00,1 25; 2 75";
+        let good =
+            "1,0.7,0.6,0.8,0.04,0.03,0.05,wind,2.5,0.97,9,12,limb_1,limb_1 1.00,11 25; 12 75";
         let cases = [
             ("0.7,0.6", "0.7,0.75", "frequency_hz is \"0.7\""),
             ("0.7,0.6", ",0.6", "frequency_hz is \"\""),
             ("wind", "storm", "excitation is \"storm\""),
             ("0.97", "1.97", "collinearity is \"1.97\""),
             (",9,", ",-9,", "n_points is \"-9\""),
-            ("9,2,", "9,two,", "a node is \"two\""),
-            ("1 25", "-1 25", "a node is \"-1\""),
-            ("1 25", "1", "motion_px2 has \"1\""),
-            ("1 25", "1 -25", "motion_px2 has \"1 -25\""),
-            ("1 25", "1 inf", "motion_px2 has \"1 inf\""),
+            ("9,12,", "9,two,", "a node is \"two\""),
+            ("11 25", "-1 25", "a node is \"-1\""),
+            ("11 25", "11", "motion_px2 has \"11\""),
+            ("11 25", "11 -25", "motion_px2 has \"11 -25\""),
+            ("11 25", "11 inf", "motion_px2 has \"11 inf\""),
         ];
-        let table = |row: &str| read_from(format!("{HEADER}\n{row}\n").as_bytes(), &forked());
+        let table = |row: &str| {
+            read_from(
+                format!("{}\n{row}\n", header()).as_bytes(),
+                &Skeleton::forked(),
+            )
+        };
         assert!(table(good).is_ok());
         for (from, to, what) in cases {
             let error = table(&good.replacen(from, to, 1)).expect_err(what);

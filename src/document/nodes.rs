@@ -11,9 +11,6 @@ use std::io::{Read, Write};
 use std::path::Path;
 
 pub(super) const FILE: &str = "nodes.csv";
-pub const NODES_HEADER: &str = "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,frequency_hz,\
-frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi,identifiable,\
-excitation,amplitude_deg,unidentified,kind,copy_of,plane_deg,certainty,moves_with,branch,order";
 
 /// Joints of a skin are numbered with two bytes.
 const MOST_NODES: usize = 1 << 16;
@@ -42,6 +39,15 @@ const COLUMNS: [&str; 12] = [
 /// All of them: [`COLUMNS`], then [`sway::COLUMNS`].
 const READ: usize = COLUMNS.len() + sway::COLUMNS.len();
 
+/// The first line of `nodes.csv`.
+pub fn nodes_header() -> String {
+    format!(
+        "node_id,parent_id,level,n_tracks,u_px,v_px,x,y,z,radius,{},kind,copy_of,plane_deg,\
+         certainty,moves_with,branch,order",
+        sway::COLUMNS.join(",")
+    )
+}
+
 /// Writes `nodes.csv`. `sway` is by node index and may be shorter than the tree; `metres_per_px` 0
 /// leaves pixels. A node is identifiable if it has a frequency with its interval; where it is not,
 /// `unidentified` says why. The names and orders of branches follow from the tree and are not read
@@ -55,7 +61,7 @@ pub fn nodes<W: Write>(
     sway: &[Swaying],
     metres_per_px: f64,
 ) -> Result<W, WriteError> {
-    let mut table = TableWriter::new(FILE, NODES_HEADER, out)?;
+    let mut table = TableWriter::new(FILE, &nodes_header(), out)?;
     let (scale, more) = unit(metres_per_px);
     let branches = skeleton.botanical_branches();
     for (i, node) in skeleton.nodes.iter().enumerate() {

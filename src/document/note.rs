@@ -5,8 +5,8 @@ use super::error::DocumentError;
 use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
 use crate::model::{
-    CaptureFacts, Judgement, LocalTime, Origin, Skeleton, SwayFacts, Swaying, Timing, UserNotes,
-    Verdict,
+    CaptureFacts, FilmCut, Judgement, LocalTime, Origin, Skeleton, SwayFacts, Swaying, Timing,
+    UserNotes, Verdict,
 };
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
@@ -308,21 +308,20 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
-    /// What the capture is worth by other answers on its sway, by node index, in a film that is cut
-    /// at `cut_at_s`; `None` where it is not known what it was judged by.
+    /// What the capture is worth by other answers on its sway, by node index, in a film that was
+    /// found to be `cut`; `None` where it is not known what it was judged by.
     pub fn judgement_with(
         &self,
         skeleton: &Skeleton,
         sway: &[Swaying],
-        cut_at_s: Option<f64>,
+        cut: Option<FilmCut>,
     ) -> Option<Judgement> {
         let facts = self.judged_by.clone()?;
-        Some(Judgement::of(CaptureFacts {
+        let facts = CaptureFacts {
             sway: SwayFacts::of(skeleton, sway),
-            // Of a part of the film it is not known whether another one is cut.
-            cut_at_s: facts.cut_at_s.or(cut_at_s),
             ..facts
-        }))
+        };
+        Some(Judgement::of(facts.with_cut(cut)))
     }
 
     /// Takes what the capture was found to be worth.

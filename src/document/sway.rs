@@ -1,76 +1,30 @@
 //! What tables say of a branch's sway: the columns of `nodes.csv`, written and read.
 
 use super::number;
-use crate::model::{Excitation, Interval, Sway, Swaying, Unidentified};
-use serde::Serialize;
+use crate::model::{Excitation, Interval, Sway, SwayColumns, Swaying, Unidentified};
 
-/// The columns of `nodes.csv` on the sway, in their order.
-pub(super) const COLUMNS: [&str; 10] = [
-    "frequency_hz",
-    "frequency_lo_hz",
-    "frequency_hi_hz",
-    "damping_ratio",
-    "damping_lo",
-    "damping_hi",
-    "identifiable",
-    "excitation",
-    "amplitude_deg",
-    "unidentified",
-];
-
-/// A branch's sway as the six columns of `nodes.csv`; no number (`null` in JSON) where a value is
-/// not known.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Columns {
-    pub frequency_hz: f64,
-    pub frequency_lo_hz: f64,
-    pub frequency_hi_hz: f64,
-    /// Share of critical damping.
-    pub damping_ratio: f64,
-    pub damping_lo: f64,
-    pub damping_hi: f64,
-}
-
-impl Columns {
-    /// The columns of one branch.
-    pub fn of(sway: &Swaying) -> Self {
-        let frequency = ends(sway.ok().map(|s| s.frequency_hz));
-        let damping = ends(sway.ok().and_then(|s| s.damping_ratio));
-        Self {
-            frequency_hz: frequency.value,
-            frequency_lo_hz: frequency.lo,
-            frequency_hi_hz: frequency.hi,
-            damping_ratio: damping.value,
-            damping_lo: damping.lo,
-            damping_hi: damping.hi,
-        }
-    }
-
-    /// In the order of the columns.
-    pub fn values(&self) -> [f64; 6] {
-        [
-            self.frequency_hz,
-            self.frequency_lo_hz,
-            self.frequency_hi_hz,
-            self.damping_ratio,
-            self.damping_lo,
-            self.damping_hi,
-        ]
-    }
-}
-
-/// The interval; no numbers where there is none.
-fn ends(interval: Option<Interval>) -> Interval {
-    interval.unwrap_or(Interval {
-        value: f64::NAN,
-        lo: f64::NAN,
-        hi: f64::NAN,
-    })
-}
+/// The columns of `nodes.csv` on the sway, in their order: first [`SwayColumns::NAMES`].
+pub(super) const COLUMNS: [&str; 10] = {
+    let [f, f_lo, f_hi, d, d_lo, d_hi] = SwayColumns::NAMES;
+    [
+        f,
+        f_lo,
+        f_hi,
+        d,
+        d_lo,
+        d_hi,
+        "identifiable",
+        "excitation",
+        "amplitude_deg",
+        "unidentified",
+    ]
+};
 
 /// The cells of [`COLUMNS`].
 pub(super) fn cells(sway: &Swaying) -> [String; 10] {
-    let [f, f_lo, f_hi, d, d_lo, d_hi] = Columns::of(sway).values().map(|x| number::text(x, 5));
+    let [f, f_lo, f_hi, d, d_lo, d_hi] = SwayColumns::of(sway.as_ref().ok())
+        .values()
+        .map(|x| number::text(x, 5));
     let amplitude_deg = sway.map_or(f64::NAN, |s| s.amplitude_deg);
     [
         f,

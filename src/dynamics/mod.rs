@@ -7,6 +7,7 @@ mod branch_turns;
 mod branches;
 mod celerite;
 mod decay;
+mod dominant_peaks;
 mod driven_modes;
 mod driven_oscillators;
 mod film;
@@ -39,6 +40,7 @@ mod wind;
 
 pub use angle::{AngleToParent, angle_in_space_deg, angle_to_parent_deg};
 pub use decay::{Mode, Start};
+pub use dominant_peaks::{DominantPeak, FALSE_ALARM, RelativeSpectrum, shared_peaks};
 pub use film::{Film, FilmTrack, NOT_SEEN};
 pub use point_modes::Shoot;
 pub use release::{Onset, fades_as_a_free_decay};

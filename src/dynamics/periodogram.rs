@@ -23,11 +23,22 @@ impl Periodogram {
     /// Of `signal` at growing `times_s` within `frequencies_hz`.
     pub fn new(times_s: &[f64], signal: &[f64], frequencies_hz: Bounds) -> Self {
         let first_s = times_s.first().copied().unwrap_or(0.0);
-        let span_s = times_s.last().map_or(1.0, |t| t - first_s).max(1e-9);
+        let last_s = times_s.last().copied().unwrap_or(1.0);
+        Self::within(
+            Bounds::new(first_s, last_s),
+            times_s,
+            signal,
+            frequencies_hz,
+        )
+    }
+
+    /// The same of a part of a film, whose first and last frames may be missing.
+    pub fn within(part_s: Bounds, times_s: &[f64], signal: &[f64], frequencies_hz: Bounds) -> Self {
+        let span_s = part_s.length().max(1e-9);
         // Hann's window, or strong sways leak into others' bands.
         let window: Vec<f64> = times_s
             .iter()
-            .map(|t| (PI * (t - first_s) / span_s).sin().powi(2))
+            .map(|t| (PI * (t - part_s.lo) / span_s).sin().powi(2))
             .collect();
         let squares = window.iter().map(|w| w * w).sum::<f64>().max(1e-9);
         let of_noise = span_s / times_s.len().max(1) as f64;
@@ -51,6 +62,16 @@ impl Periodogram {
             power,
             of_noise,
         }
+    }
+
+    /// The power at every frequency.
+    pub fn power(&self) -> &[f64] {
+        &self.power
+    }
+
+    /// Which multiple of one over the film's length the first of them is.
+    pub fn first_multiple(&self) -> usize {
+        self.first
     }
 }
 

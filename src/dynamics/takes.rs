@@ -7,6 +7,7 @@
 
 use super::film::{Film, FilmTrack};
 use super::members::{is_seen, mean_px};
+use crate::model::FilmCut;
 use crate::signal::statistics::median;
 use nalgebra::{Point2, distance};
 use std::ops::Range;
@@ -100,9 +101,12 @@ impl Take {
         }
     }
 
-    /// Where the film is first cut, s.
-    pub fn first_cut_s(&self) -> Option<f64> {
-        self.cuts_s.first().copied()
+    /// What the film lacks; `None` where it is in one piece.
+    pub fn cut(&self) -> Option<FilmCut> {
+        Some(FilmCut {
+            at_s: *self.cuts_s.first()?,
+            left_out_s: self.left_out_s,
+        })
     }
 
     /// What is to be said of a film that is not in one piece.

@@ -1,10 +1,10 @@
 //! What the HTML page knows of the tree apart from its model.
 
-use crate::document::{CaptureNote, Columns};
+use crate::document::CaptureNote;
 use crate::dynamics::angle_to_parent_deg;
 use crate::model::{
     BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, ModeSummary, NodeId, Participation, Pose,
-    Skeleton, Swaying, TreeMode, UserNotes, moves_with, reason,
+    Skeleton, SwayColumns, Swaying, TreeMode, UserNotes, moves_with, reason,
 };
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -70,7 +70,7 @@ pub struct Branch {
     /// Its end at rest, model axes, px.
     pub end: [f64; 3],
     /// What was identified of its sway; numbers that are not known are `null`.
-    pub sway: Option<Columns>,
+    pub sway: Option<SwayColumns>,
     /// Of a measured branch without a frequency of its own: why, in words, and the modes of the
     /// tree that it moves with, the largest share first.
     pub why: Option<String>,
@@ -172,7 +172,9 @@ impl Facts<'_> {
             main_branch: self.main_branches[i],
             n_tracks: node.n_tracks,
             end: [node.position.x, node.position.y, node.position.z].map(|x| rounded(x, 1e4)),
-            sway: sway.filter(|s| s.is_ok()).map(Columns::of),
+            sway: sway
+                .and_then(|s| s.as_ref().ok())
+                .map(|s| SwayColumns::of(Some(s))),
             why: answer
                 .and_then(|s| s.err())
                 .map(|why| reason(why, &participation)),

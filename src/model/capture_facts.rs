@@ -83,6 +83,15 @@ pub struct CaptureFacts {
     pub cut_at_s: Option<f64>,
 }
 
+/// What a film lacks that is not in one piece.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmCut {
+    /// Where it is first cut, or its picture stands still, s since the first frame.
+    pub at_s: f64,
+    /// How much of it is left out, s.
+    pub left_out_s: f64,
+}
+
 /// How the points were followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointFacts {
@@ -141,6 +150,19 @@ impl SwayFacts {
 }
 
 impl CaptureFacts {
+    /// The same of a film that was found to be `cut`. One that was known to be cut stays as it is:
+    /// of a part of the film it is not known whether another one is cut.
+    pub fn with_cut(self, cut: Option<FilmCut>) -> Self {
+        match cut {
+            Some(cut) if self.cut_at_s.is_none() => Self {
+                filmed_s: (self.filmed_s - cut.left_out_s).max(0.0),
+                cut_at_s: Some(cut.at_s),
+                ..self
+            },
+            _ => self,
+        }
+    }
+
     /// All that is not as it should be, the worst first.
     pub(super) fn findings(&self) -> Vec<Finding> {
         let found = [

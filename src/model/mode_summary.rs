@@ -1,6 +1,6 @@
 //! What files and views say of a mode of the whole tree.
 
-use super::{BotanicalBranches, Interval, LimbEnergy, NodeName, Skeleton, Sway, TreeMode};
+use super::{BotanicalBranches, LimbEnergy, NodeName, Skeleton, Sway, SwayColumns, TreeMode};
 use serde::{Serialize, Serializer};
 
 /// A mode of the whole tree by the names of the tree's parts.
@@ -81,18 +81,8 @@ impl Serialize for ModeSummary {
 #[derive(Serialize)]
 struct Row<'a> {
     mode: usize,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    frequency_hz: f64,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    frequency_lo_hz: f64,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    frequency_hi_hz: f64,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    damping_ratio: f64,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    damping_lo: f64,
-    #[serde(serialize_with = "super::rounded::to_5")]
-    damping_hi: f64,
+    #[serde(flatten)]
+    sway: SwayColumns,
     excitation: &'static str,
     #[serde(serialize_with = "super::rounded::to_4")]
     amplitude_deg: f64,
@@ -106,20 +96,9 @@ struct Row<'a> {
 
 impl<'a> Row<'a> {
     fn of(mode: &'a ModeSummary) -> Self {
-        let frequency_hz = mode.sway.frequency_hz;
-        let damping = mode.sway.damping_ratio.unwrap_or(Interval {
-            value: f64::NAN,
-            lo: f64::NAN,
-            hi: f64::NAN,
-        });
         Self {
             mode: mode.mode,
-            frequency_hz: frequency_hz.value,
-            frequency_lo_hz: frequency_hz.lo,
-            frequency_hi_hz: frequency_hz.hi,
-            damping_ratio: damping.value,
-            damping_lo: damping.lo,
-            damping_hi: damping.hi,
+            sway: SwayColumns::of(Some(&mode.sway)),
             excitation: mode.sway.excitation.word(),
             amplitude_deg: mode.sway.amplitude_deg,
             collinearity: mode.collinearity.unwrap_or(f64::NAN),
@@ -134,22 +113,8 @@ impl<'a> Row<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Excitation, Node, NodeId, Size};
+    use crate::model::{Excitation, Interval, NodeId};
     use serde_json::json;
-
-    /// A trunk that forks into two limbs.
-    fn forked() -> Skeleton {
-        Skeleton {
-            nodes: vec![
-                Node::made_up(10, None, [0.0, 0.0, 0.0]),
-                Node::made_up(11, Some(0), [0.0, 100.0, 0.0]),
-                Node::made_up(12, Some(1), [-40.0, 160.0, 0.0]),
-                Node::made_up(13, Some(1), [5.0, 190.0, 0.0]),
-            ],
-            foot_px: [320.0, 300.0].into(),
-            image_size: Size::new(640, 360),
-        }
-    }
 
     fn mode() -> TreeMode {
         TreeMode {
@@ -177,7 +142,7 @@ mod tests {
             motion_px2: Vec::new(),
             ..mode()
         };
-        let all = ModeSummary::all(&[mode(), lacked], &forked());
+        let all = ModeSummary::all(&[mode(), lacked], &Skeleton::forked());
         assert_eq!((all[0].mode, all[1].mode), (1, 2));
         assert_eq!(all[0].node, Some(NodeName(12)));
         assert_eq!(all[0].branch.as_deref(), Some("limb_1"));
@@ -190,7 +155,7 @@ mod tests {
 
     #[test]
     fn as_json_it_has_the_columns_of_the_table() {
-        let all = ModeSummary::all(&[mode()], &forked());
+        let all = ModeSummary::all(&[mode()], &Skeleton::forked());
         let json = serde_json::to_value(&all).expect("json");
         assert_eq!(
             json,

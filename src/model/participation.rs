@@ -101,22 +101,7 @@ impl fmt::Display for Participation {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Excitation, Interval, Node, Size, Skeleton, Sway};
-
-    /// A trunk (1) with two limbs (2, 3), of which the second goes on as the trunk.
-    fn branches() -> BotanicalBranches {
-        let skeleton = Skeleton {
-            nodes: vec![
-                Node::made_up(0, None, [0.0, 0.0, 0.0]),
-                Node::made_up(1, Some(0), [0.0, 100.0, 0.0]),
-                Node::made_up(2, Some(1), [-40.0, 160.0, 0.0]),
-                Node::made_up(3, Some(1), [5.0, 190.0, 0.0]),
-            ],
-            foot_px: [320.0, 300.0].into(),
-            image_size: Size::new(640, 360),
-        };
-        skeleton.botanical_branches()
-    }
+    use crate::model::{Excitation, Interval, Skeleton, Sway};
 
     fn mode(frequency_hz: f64, node: Option<u32>, motion_px2: &[f64]) -> TreeMode {
         TreeMode {
@@ -148,7 +133,11 @@ mod tests {
     }
 
     fn of(node: u32) -> Vec<Participation> {
-        participation(&modes(), &branches(), NodeId(node))
+        participation(
+            &modes(),
+            &Skeleton::forked().botanical_branches(),
+            NodeId(node),
+        )
     }
 
     fn shares(node: u32) -> Vec<(usize, f64)> {
@@ -169,10 +158,17 @@ mod tests {
         for node in [0, 4, u32::MAX] {
             assert!(of(node).is_empty(), "{node}");
         }
-        assert!(participation(&[], &branches(), NodeId(1)).is_empty());
+        assert!(participation(&[], &Skeleton::forked().botanical_branches(), NodeId(1)).is_empty());
         let wild = [mode(1.0, None, &[f64::NAN, f64::INFINITY])];
         for node in [0, 1] {
-            assert!(participation(&wild, &branches(), NodeId(node)).is_empty());
+            assert!(
+                participation(
+                    &wild,
+                    &Skeleton::forked().botanical_branches(),
+                    NodeId(node)
+                )
+                .is_empty()
+            );
         }
     }
 

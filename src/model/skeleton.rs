@@ -121,6 +121,28 @@ pub struct Skeleton {
     pub image_size: Size,
 }
 
+#[cfg(test)]
+impl Skeleton {
+    /// A trunk that forks into two limbs, for tests; the right one goes on as the trunk. Names are
+    /// not indices.
+    pub(crate) fn forked() -> Self {
+        let mut nodes = vec![
+            Node::made_up(10, None, [0.0, 0.0, 0.0]),
+            Node::made_up(11, Some(0), [0.0, 100.0, 0.0]),
+            Node::made_up(12, Some(1), [-40.0, 160.0, 0.0]),
+            Node::made_up(13, Some(1), [5.0, 190.0, 0.0]),
+        ];
+        for (node, level) in nodes.iter_mut().zip([0, 1, 2, 2]) {
+            node.level = level;
+        }
+        Self {
+            nodes,
+            foot_px: [320.0, 300.0].into(),
+            image_size: Size::new(640, 360),
+        }
+    }
+}
+
 impl Skeleton {
     /// Number of nodes that were measured; they come first.
     pub fn measured(&self) -> usize {

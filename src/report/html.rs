@@ -1,7 +1,9 @@
 //! The page: one HTML file that needs no network, no script and no other file.
 
 use super::compare::Comparison;
-use super::page::{branch_part, compared_part, levels_part, modes_part, not_said, table_part};
+use super::page::{
+    branch_part, compared_part, levels_part, modes_part, not_said, pattern_part, table_part,
+};
 use super::plot::{Map, escaped, map};
 use super::study::Study;
 use super::words;
@@ -81,6 +83,7 @@ fn one(k: usize, study: &Study, several: bool) -> String {
     out += &table_part(study);
     out += &modes_part(study);
     out += &levels_part(study);
+    out += &pattern_part(study);
     out += &not_said(study);
     if study.answers() > 0 {
         out += "<h3>Branch by branch</h3>";
@@ -171,6 +174,9 @@ each stands its share of the squares of that motion.</p>\
 angle's spectrum says. They are for reference. A short film's peak is as wide as one over its length, so \
 that this damping is too high, and the largest peak may be that of a parent branch or of the whole tree. Of \
 a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\
+<p>The <b>dominant peaks</b> of a level are those of the spectrum of the angle to the parent branch that at \
+least half of its branches have beyond a smooth background (Hu et al., section 5.4). The level counts forks from the foot, the trunk's is 1; the order is the botanical one, the \
+trunk's is 0.</p>\
 <p>In the plots of the angle the mean is taken off; the grey part before a release is not used. The dashed \
 curve is the part of the angle that has the branch's own frequency and damping; what is beyond it is the \
 sway of others and noise. The angle in space rests on an estimated depth.</p></section>";

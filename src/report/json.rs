@@ -3,8 +3,9 @@
 use super::compare::{Change, Comparison, Row};
 use super::levels::{Growth, Spread, growth, levels};
 use super::matching::Match;
+use super::pattern::{CommonPeak, LevelPeaks, Pattern, pattern, peaks_of};
 use super::study::{Branch, Gap, Study};
-use crate::dynamics::Start;
+use crate::dynamics::{DominantPeak, FALSE_ALARM, Start};
 use crate::model::{Interval, Unidentified};
 use serde_json::{Map, Value, json};
 
@@ -51,6 +52,7 @@ fn capture(study: &Study) -> Value {
             "frequency": growth(study, |s| Some(s.frequency_hz.value)).map(grown),
             "damping": growth(study, |s| s.damping_ratio.map(|d| d.value)).map(grown),
         },
+        "dominant_peaks": dominant(&pattern(study)),
         "modes": study.modes,
         "notes": study.notes,
     })
@@ -78,10 +80,47 @@ fn branch(study: &Study, branch: &Branch) -> Value {
         "amplitude_m": sway.and(metres),
         "spectrum_peak_hz": branch.reference.map(|r| r.peak_hz),
         "half_power_damping": branch.reference.map(|r| r.damping_ratio),
+        "dominant_peaks": branch.over_background.as_ref().map(|_| peaks(&peaks_of(branch))),
         "unidentified": branch.sway.err().map(Unidentified::word),
         "why": branch.why(),
         "participation": branch.participation,
     })
+}
+
+fn dominant(pattern: &Pattern) -> Value {
+    let common = pattern.common.as_ref().ok();
+    json!({
+        "false_alarm": FALSE_ALARM,
+        "resolution_hz": pattern.resolution_hz,
+        "levels": pattern.levels.iter().map(level_peaks).collect::<Vec<Value>>(),
+        "common": common.into_iter().flatten().map(common_peak).collect::<Vec<Value>>(),
+        "no_common": pattern.common.as_ref().err().map(|why| why.word()),
+        "why": pattern.common.as_ref().err().map(|why| why.to_string()),
+    })
+}
+
+fn level_peaks(level: &LevelPeaks) -> Value {
+    json!({
+        "level": level.level,
+        "orders": level.orders.clone().collect::<Vec<u32>>(),
+        "branches": level.branches,
+        "peaks": peaks(&level.peaks),
+    })
+}
+
+fn common_peak(peak: &CommonPeak) -> Value {
+    json!({
+        "frequency_hz": peak.frequency_hz,
+        "over_background": peak.over_background,
+        "branches_with": peak.branches_with,
+        "branches": peak.branches,
+    })
+}
+
+fn peaks(of: &[DominantPeak]) -> Value {
+    of.iter()
+        .map(|p| json!({ "frequency_hz": p.frequency_hz, "over_background": p.over_background }))
+        .collect()
 }
 
 fn compared(studies: &[Study], comparison: &Comparison) -> Value {

@@ -4,12 +4,14 @@ mod branch;
 mod compared;
 mod levels;
 mod modes;
+mod pattern;
 mod table;
 
 pub use branch::branch_part;
 pub use compared::compared_part;
 pub use levels::levels_part;
 pub use modes::modes_part;
+pub use pattern::pattern_part;
 pub use table::{not_said, table_part};
 
 use super::plot::escaped;

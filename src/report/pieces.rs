@@ -4,6 +4,7 @@
 //! is, and the peaks in it are one bin wide (P. Welch 1967). The mean over pieces is smooth, and as
 //! fine as a piece is long.
 
+use crate::bounds::Bounds;
 use crate::dynamics::{Spectrum, spectrum};
 
 /// Length of a piece, s; each begins in the middle of the one before.
@@ -19,16 +20,30 @@ pub fn looked_at_s(span_s: f64) -> f64 {
     }
 }
 
+/// The pieces of a film, of one length, s: the film itself where it is shorter than a piece and a
+/// half.
+pub fn pieces(film_s: Bounds) -> Vec<Bounds> {
+    if looked_at_s(film_s.length()) >= film_s.length() {
+        return vec![film_s];
+    }
+    let count = ((film_s.length() - PIECE_S) / (0.5 * PIECE_S)).floor() as usize + 1;
+    let mut out = Vec::with_capacity(count);
+    for k in 0..count {
+        let from_s = film_s.lo + 0.5 * PIECE_S * k as f64;
+        out.push(Bounds::new(from_s, from_s + PIECE_S));
+    }
+    out
+}
+
 /// The root of the mean square of the pieces' spectra; the film's own where it is shorter than a
 /// piece and a half.
 pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     let (first, last) = (*times_s.first()?, *times_s.last()?);
-    if looked_at_s(last - first) >= last - first {
+    let pieces = pieces(Bounds::new(first, last));
+    if pieces.len() == 1 {
         return spectrum(times_s, values);
     }
-    let count = ((last - first - PIECE_S) / (0.5 * PIECE_S)).floor() as usize + 1;
-    let mut pieces =
-        (0..count).filter_map(|k| piece(times_s, values, first + 0.5 * PIECE_S * k as f64));
+    let mut pieces = pieces.iter().filter_map(|p| piece(times_s, values, *p));
     let Spectrum { bin_hz, amplitude } = pieces.next()?;
     let (mut squares, mut n): (Vec<f64>, f64) = (amplitude.iter().map(|a| a * a).collect(), 1.0);
     for other in pieces {
@@ -44,11 +59,11 @@ pub fn averaged(times_s: &[f64], values: &[f64]) -> Option<Spectrum> {
     })
 }
 
-/// The spectrum of the piece that begins at `from_s`.
-fn piece(times_s: &[f64], values: &[f64], from_s: f64) -> Option<Spectrum> {
+/// The spectrum of a piece, without the moment at which it ends.
+fn piece(times_s: &[f64], values: &[f64], piece_s: Bounds) -> Option<Spectrum> {
     let (mut piece_times_s, mut piece_values) = (Vec::new(), Vec::new());
     for (time_s, value) in times_s.iter().zip(values) {
-        if from_s <= *time_s && *time_s < from_s + PIECE_S {
+        if piece_s.contains(*time_s) && *time_s < piece_s.hi {
             piece_times_s.push(*time_s);
             piece_values.push(*value);
         }

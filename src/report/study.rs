@@ -1,11 +1,11 @@
 //! One capture, analysed: what the table, the JSON and the page are made from.
 
 use super::decaying::decaying;
-use super::pieces::{averaged, looked_at_s};
+use super::pieces::{averaged, looked_at_s, pieces};
 use crate::bounds::Bounds;
 use crate::dynamics::{
-    Analysis, Film, HalfPower, LEAST_PERIODS, Onset, Spectrum, angle_in_space_deg,
-    angle_to_parent_deg, spectrum,
+    Analysis, Film, HalfPower, LEAST_PERIODS, Onset, RelativeSpectrum, Spectrum,
+    angle_in_space_deg, angle_to_parent_deg, spectrum,
 };
 use crate::model::{
     BotanicalBranches, Excitation, ModeSummary, NodeId, Origin, Participation, Pose, Skeleton,
@@ -141,6 +141,9 @@ pub struct Branch {
     /// wind a mean over pieces.
     pub spectrum: Option<Spectrum>,
     pub reference: Option<HalfPower>,
+    /// Power of the same angle over a smooth background, by its true times. `None` without poses,
+    /// of a film that is too short, and of an angle that does not change.
+    pub over_background: Option<RelativeSpectrum>,
     /// Where its end went: to the right of its place at rest and above it, px, by
     /// [`times_s`](Self::times_s).
     pub way_px: Vec<Vector2<f64>>,
@@ -303,6 +306,7 @@ fn branch(
     let plane_deg = centred(angle_to_parent_deg(skeleton, poses, node));
     let space_deg = centred(angle_in_space_deg(skeleton, poses, node));
     let (spectrum, reference) = seen_in(given, &times_s, &plane_deg, used_s);
+    let over_background = over_background(given, &times_s, &plane_deg, used_s);
     let released = sway.ok().filter(|s| s.excitation == Excitation::Release);
     let fitted = released.zip(given.analysis.onset).and_then(|(own, onset)| {
         let others = others_seen(given, node);
@@ -339,6 +343,7 @@ fn branch(
         fitted_deg: fitted.map(|f| f.curve_deg),
         spectrum,
         reference,
+        over_background,
     }
 }
 
@@ -429,9 +434,32 @@ fn seen_in(
             used_deg.push(*deg);
         }
     }
+    seen(&used_times_s, &used_deg, is_driven(given), given.highest_hz)
+}
+
+/// Whether wind drove the tree, as far as is known.
+fn is_driven(given: &Given) -> bool {
     let onset = given.analysis.onset;
-    let driven = onset.is_none_or(|o| o.excitation == Excitation::Wind);
-    seen(&used_times_s, &used_deg, driven, given.highest_hz)
+    onset.is_none_or(|o| o.excitation == Excitation::Wind)
+}
+
+/// Power of an angle over its background in the time that the analysis has used; of a film in wind
+/// in its pieces.
+fn over_background(
+    given: &Given,
+    times_s: &[f64],
+    angle_deg: &[f64],
+    used_s: Bounds,
+) -> Option<RelativeSpectrum> {
+    let pieces = if is_driven(given) {
+        pieces(used_s)
+    } else {
+        vec![used_s]
+    };
+    let lowest_hz = LEAST_PERIODS / pieces.first()?.length();
+    let highest_hz = given.highest_hz.min(0.5 / given.film.step_s());
+    let within_hz = Bounds::new(lowest_hz, highest_hz);
+    RelativeSpectrum::of(times_s, angle_deg, &pieces, within_hz)
 }
 
 /// The sways of the branches that carry this one and of those that leave its end, which is seen to

@@ -39,6 +39,7 @@ pub fn study(tips: &[Point2<f64>]) -> Study {
         fitted_deg: None,
         spectrum: None,
         reference: None,
+        over_background: None,
         way_px: Vec::new(),
     });
     Study {

@@ -5,6 +5,7 @@ mod compared;
 use super::columns::{Table, wrapped};
 use super::compare::Comparison;
 use super::levels::{Growth, Level, Spread, growth, levels};
+use super::pattern::{LevelPeaks, Pattern, pattern};
 use super::study::{Branch, Study};
 use super::values::{interval, number, percent, spread};
 use super::words;
@@ -81,7 +82,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         out += &level_table(&by_level, columns);
         out += &wrapped(&trends(study), columns);
     }
-    out
+    out + &peak_table(&pattern(study), columns)
 }
 
 fn left_out(heads: &[String]) -> String {
@@ -197,6 +198,52 @@ pub fn level_cells(level: &Level) -> [String; 5] {
 
 fn spread_or_dash(of: Option<&Spread>) -> String {
     of.map_or("-".into(), |s| spread(s, 3))
+}
+
+/// The heads of the table of dominant peaks, and how soon each can be spared.
+pub const PEAK_HEADS: [(&str, u8); 4] = [
+    ("level", 0),
+    ("order", 2),
+    ("branches", 1),
+    ("dominant peaks, Hz", 0),
+];
+
+fn peak_table(pattern: &Pattern, columns: Option<usize>) -> String {
+    let mut out = String::from("\n");
+    if !pattern.levels.is_empty() {
+        let mut table = Table::new(&PEAK_HEADS);
+        for level in &pattern.levels {
+            table.push(peak_cells(level).to_vec());
+        }
+        out += &table.within(columns).0;
+        let what = "  peaks of the angle's spectrum that half of the branches of a level have, the \
+                    clearest first (Hu et al. sect. 5.4); order: botanical\n";
+        out += &wrapped(what, columns);
+    }
+    out + &wrapped(&format!("  {}\n", words::common_peaks(pattern)), columns)
+}
+
+/// A row of the table of dominant peaks, by [`PEAK_HEADS`].
+pub fn peak_cells(level: &LevelPeaks) -> [String; 4] {
+    let (lowest, highest) = (level.orders.start(), level.orders.end());
+    let orders = if lowest == highest {
+        lowest.to_string()
+    } else {
+        format!("{lowest} to {highest}")
+    };
+    let peaks = level.peaks.iter().map(|p| number(p.frequency_hz, 2));
+    let peaks: Vec<String> = peaks.collect();
+    let peaks = if peaks.is_empty() {
+        "none".into()
+    } else {
+        peaks.join(", ")
+    };
+    [
+        level.level.to_string(),
+        orders,
+        level.branches.to_string(),
+        peaks,
+    ]
 }
 
 /// How frequency and damping grow with the level, in words.

@@ -6,17 +6,16 @@ use super::matching::Match;
 use super::study::{Branch, Study};
 use crate::document::TableWriter;
 use crate::files::WriteError;
-use crate::model::{Interval, Sway, Unidentified};
+use crate::model::{Interval, Sway, SwayColumns, Unidentified};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The columns before the user's notes and after them.
+/// The columns before the user's notes, and those after them, before and after frequency and
+/// damping.
 const BEFORE_NOTES: &str = "tree_branch,capture,captured_at";
-const AFTER_NOTES: &str = "node_id,branch,parent_id,level,order,points,matched_by,off,excitation,\
-                           frequency_hz,frequency_lo_hz,frequency_hi_hz,\
-                           damping_ratio,damping_lo,damping_hi,\
-                           amplitude_deg,amplitude_px,amplitude_m,unidentified,\
-                           frequency_to_first,frequency_to_first_lo,frequency_to_first_hi,\
-                           damping_to_first,damping_to_first_lo,damping_to_first_hi";
+const BEFORE_SWAY: &str = "node_id,branch,parent_id,level,order,points,matched_by,off,excitation";
+const AFTER_SWAY: &str = "amplitude_deg,amplitude_px,amplitude_m,unidentified,\
+                          frequency_to_first,frequency_to_first_lo,frequency_to_first_hi,\
+                          damping_to_first,damping_to_first_lo,damping_to_first_hi";
 /// What a note's column begins with, so that no note is taken for a column of ours.
 const NOTE: &str = "note_";
 
@@ -28,7 +27,8 @@ pub fn csv(studies: &[Study], comparison: Option<&Comparison>) -> Result<Vec<u8>
     let keys: BTreeSet<&str> = studies.iter().flat_map(note_keys).collect();
     let notes = keys.iter().map(|key| format!(",{NOTE}{key}"));
     let notes: String = notes.collect();
-    let header = format!("{BEFORE_NOTES}{notes},{AFTER_NOTES}");
+    let sway = SwayColumns::NAMES.join(",");
+    let header = format!("{BEFORE_NOTES}{notes},{BEFORE_SWAY},{sway},{AFTER_SWAY}");
     let mut table = TableWriter::new("the table", &header, Vec::new())?;
     let tree = TreeBranches::of(studies, comparison);
     for (k, study) in studies.iter().enumerate() {

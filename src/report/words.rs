@@ -1,6 +1,8 @@
 //! Plain words for what the tables say in one.
 
+use super::pattern::{LEVELS, Pattern};
 use super::study::{Gap, Study};
+use super::values::number;
 use crate::dynamics::Start;
 use crate::model::{Excitation, Unidentified};
 
@@ -65,6 +67,35 @@ pub fn gaps(study: &Study) -> String {
             )
         }
     }
+}
+
+/// `common to levels 1 to 3: 0.76 Hz, in 11 of 14 branches (frequencies within 0.05 Hz count as
+/// one)`, or why there is none.
+pub fn common_peaks(pattern: &Pattern) -> String {
+    let common = match &pattern.common {
+        Err(why) => format!("none: {why}"),
+        Ok(peaks) => {
+            let mut words = Vec::with_capacity(peaks.len());
+            for peak in peaks {
+                words.push(format!(
+                    "{} Hz, in {} of {}",
+                    number(peak.frequency_hz, 2),
+                    peak.branches_with,
+                    number_of(peak.branches, "branch")
+                ));
+            }
+            words.join("; ")
+        }
+    };
+    let within = match pattern.resolution_hz {
+        Some(hz) => format!(" (within {} Hz frequencies count as one)", number(hz, 2)),
+        None => String::new(),
+    };
+    format!(
+        "dominant peak common to levels {} to {}: {common}{within}",
+        LEVELS.start(),
+        LEVELS.end()
+    )
 }
 
 /// `1 gap`, `2 gaps`.

@@ -201,7 +201,7 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     let found = SwayFound {
         sway: &model.modes,
         modes: &model.tree_modes,
-        cut_at_s: take.first_cut_s(),
+        cut: take.cut(),
     };
     writer?.write(&done.folder, found, warnings, Some(judgement))?;
     let dir = done.folder.publish()?;

@@ -3,7 +3,9 @@
 use super::finish::{CaptureJob, Quality, timing};
 use crate::config::Dynamics;
 use crate::dynamics::Take;
-use crate::model::{CaptureFacts, FootBasis, Judgement, Picture, PointFacts, SwayFacts, TrackLog};
+use crate::model::{
+    CaptureFacts, FilmCut, FootBasis, Judgement, Picture, PointFacts, SwayFacts, TrackLog,
+};
 use crate::signal::statistics::quantile;
 use crate::solve::Model;
 
@@ -24,10 +26,8 @@ pub struct JudgedFilm<'a> {
     /// `None` without a tree.
     pub foot: Option<FootBasis>,
     pub sway: Option<SwayFacts>,
-    /// Where the film is cut, s; `None` where it is in one piece, or that is not known yet.
-    pub cut_at_s: Option<f64>,
-    /// What is left out of it as it is cut, s.
-    pub left_out_s: f64,
+    /// `None` where the film is in one piece, or that is not known yet.
+    pub cut: Option<FilmCut>,
 }
 
 /// How long it is.
@@ -47,7 +47,7 @@ impl JudgedFilm<'_> {
         CaptureFacts {
             is_filming: self.is_filming,
             amplitude_px: quantile(amplitudes_px, QUIETER),
-            filmed_s: (self.length.seconds * (1.0 - shaking.lost_share) - self.left_out_s).max(0.0),
+            filmed_s: self.length.seconds * (1.0 - shaking.lost_share),
             rate_hz: self.length.rate_hz,
             highest_hz: self.settings.highest_hz,
             points: PointFacts {
@@ -61,8 +61,9 @@ impl JudgedFilm<'_> {
             shake: shaking.shake,
             is_camera_unknown: !shaking.is_known(),
             camera_moved_at_s: shaking.lost_since_s,
-            cut_at_s: self.cut_at_s,
+            cut_at_s: None,
         }
+        .with_cut(self.cut)
     }
 }
 
@@ -82,8 +83,7 @@ pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
         brightness: job.picture.as_ref().and_then(mean_grey),
         foot: tree.map(|tree| tree.foot.basis),
         sway: tree.and_then(|tree| SwayFacts::of(&tree.skeleton, &tree.modes)),
-        cut_at_s: take.first_cut_s(),
-        left_out_s: take.left_out_s,
+        cut: take.cut(),
     };
     Judgement::of(film.facts())
 }

@@ -66,8 +66,7 @@ impl LiveVerdict {
             brightness: self.brightness,
             foot: model.map(|model| model.foot.basis),
             sway: model.and_then(|model| self.sway_facts(model)),
-            cut_at_s: None,
-            left_out_s: 0.0,
+            cut: None,
         };
         let Judgement { verdict, facts } = Judgement::of(film.facts());
         self.missing_s = facts.missing_s();

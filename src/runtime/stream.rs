@@ -1,7 +1,7 @@
 //! A line of the stream of poses: JSON, one line a frame.
 
 use super::shared::Shared;
-use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayNow, Verdict};
+use crate::model::{BranchSway, NodeName, Pose, Skeleton, SwayColumns, SwayNow, Verdict};
 use serde::Serialize;
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
@@ -88,22 +88,12 @@ fn of_branch(name: NodeName, branch: &BranchSway) -> String {
     );
     match &branch.swaying {
         Ok(sway) => {
-            let f = sway.frequency_hz;
-            let mut all = vec![
-                ("frequency_hz", f.value),
-                ("frequency_lo_hz", f.lo),
-                ("frequency_hi_hz", f.hi),
-            ];
-            if let Some(d) = sway.damping_ratio {
-                all.extend([
-                    ("damping_ratio", d.value),
-                    ("damping_lo", d.lo),
-                    ("damping_hi", d.hi),
-                ]);
-            }
-            all.push(("amplitude_deg", sway.amplitude_deg));
-            // JSON knows no infinity.
-            for (name, x) in all.into_iter().filter(|(_, x)| x.is_finite()) {
+            let columns = SwayColumns::NAMES
+                .into_iter()
+                .zip(SwayColumns::of(Some(sway)).values());
+            let all = columns.chain([("amplitude_deg", sway.amplitude_deg)]);
+            // What is not known has no key.
+            for (name, x) in all.filter(|(_, x)| x.is_finite()) {
                 let _ = write!(text, ",\"{name}\":{x:.5}");
             }
             let _ = write!(text, ",\"excitation\":\"{}\"", sway.excitation.word());

@@ -6,7 +6,9 @@ use crate::document::note::{CaptureNote, json};
 use crate::document::{BARK_FILE, Document, MODES_FILE, PICTURE_FILE, at_rest_files, jpeg, png};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace, write_files};
-use crate::model::{AtRest, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes};
+use crate::model::{
+    AtRest, FilmCut, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes,
+};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -42,8 +44,8 @@ pub struct SwayFound<'a> {
     pub sway: &'a [Swaying],
     /// Those of the whole tree, the slowest first.
     pub modes: &'a [TreeMode],
-    /// Where the film is cut, s; `None` where it is in one piece, or that is not known.
-    pub cut_at_s: Option<f64>,
+    /// `None` where the film is in one piece, or that is not known.
+    pub cut: Option<FilmCut>,
 }
 
 /// A document on its way to the disk.
@@ -138,7 +140,7 @@ pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<Path
     let found = SwayFound {
         sway,
         modes: &[],
-        cut_at_s: None,
+        cut: None,
     };
     DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
     Ok(folder.publish()?)
@@ -163,7 +165,7 @@ pub fn update(dir: &Path, found: SwayFound, stop: &AtomicBool) -> Result<(), Pre
         put(&dir.join(MODEL_FILE), &model, stop)?;
     }
     let Document { note, skeleton, .. } = &mut tree.document;
-    if let Some(judgement) = note.judgement_with(skeleton, found.sway, found.cut_at_s) {
+    if let Some(judgement) = note.judgement_with(skeleton, found.sway, found.cut) {
         note.take_judgement(judgement);
         put(&dir.join(NOTE_FILE), &json(note)?, stop)?;
     }
