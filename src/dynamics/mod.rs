@@ -6,6 +6,7 @@ mod branch_tree;
 mod branches;
 mod celerite;
 mod decay;
+mod driven_likelihood;
 mod driven_modes;
 mod driven_oscillators;
 mod film;
