@@ -8,6 +8,7 @@
 
 use super::decay::{each_step, powers};
 use crate::signal::gram::GramCholesky;
+use crate::signal::ln_product::LnProduct;
 use crate::signal::principal::symmetric;
 use nalgebra::Complex;
 use std::cell::RefCell;
@@ -257,7 +258,7 @@ fn likelihood<const J: usize>(
     let (mut z, mut d) = (vec![0.0; signals.len()], 0.0);
     let n = signals.len();
     let mut gram = vec![0.0; n * n];
-    let mut log_determinant = 0.0;
+    let mut determinant = LnProduct::one();
     for k in 0..frames {
         ranks.at(k, &mut u, &mut v, &mut phi);
         let mut su = [0.0; J];
@@ -284,7 +285,7 @@ fn likelihood<const J: usize>(
         for ((z, f), signal) in z.iter_mut().zip(&f).zip(signals) {
             *z = signal[k] - (0..J).map(|a| u[a] * f[a]).sum::<f64>();
         }
-        log_determinant += d.ln();
+        determinant.times(d);
         for i in 0..n {
             let share = z[i] / d;
             for (sum, other) in gram[i * n..].iter_mut().zip(&z[..=i]) {
@@ -292,7 +293,7 @@ fn likelihood<const J: usize>(
             }
         }
     }
-    log_determinant + squares_left(&gram, n)
+    determinant.ln() + squares_left(&gram, n)
 }
 
 /// What is left of the first signal's squares when the others have been fitted to it: `gram` holds

@@ -7,6 +7,7 @@
 
 use super::branches::LnDeviations;
 use super::decay::{LN_DAMPING_WEIGHT, Mode, USUAL_DAMPING, damping_penalty};
+use super::driven_likelihood::Spanned;
 use super::driven_oscillators::DAMPING;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
@@ -52,24 +53,27 @@ impl Spectrum {
         let span_s = ends.map_or(0.0, |(first, last)| last - first);
         let density = (2.0 * span_s).sqrt() / times_s.len().max(1) as f64;
         let first = (within_hz.lo * span_s).ceil() as usize;
-        let last = (within_hz.hi * span_s).floor() as usize;
-        let mut out = Self {
-            frequencies_hz: Vec::new(),
-            coefficients: Vec::new(),
-        };
-        for k in first..=last {
-            let frequency_hz = k as f64 / span_s;
-            let mut coefficient = DVector::zeros(motions.len());
-            for (frame, time_s) in times_s.iter().enumerate() {
-                let turn = Complex::from_polar(density, -TAU * frequency_hz * time_s);
-                for (sum, motion) in coefficient.iter_mut().zip(motions) {
-                    *sum += turn * motion[frame];
-                }
+        let end = (within_hz.hi * span_s).floor() as usize + 1;
+        // What every frame counts at every frequency.
+        let frequencies = end.saturating_sub(first);
+        let mut real = DMatrix::zeros(frequencies, times_s.len());
+        let mut imaginary = real.clone();
+        for (frame, time_s) in times_s.iter().enumerate() {
+            let step = -TAU * time_s / span_s;
+            let mut wave = Complex::from_polar(density, step * first as f64);
+            let step = Complex::from_polar(1.0, step);
+            for k in 0..frequencies {
+                (real[(k, frame)], imaginary[(k, frame)]) = (wave.re, wave.im);
+                wave *= step;
             }
-            out.frequencies_hz.push(frequency_hz);
-            out.coefficients.push(coefficient);
         }
-        out
+        let motions = DMatrix::from_fn(times_s.len(), motions.len(), |k, m| motions[m][k]);
+        let (real, imaginary) = (real * &motions, imaginary * motions);
+        let coefficients = real.zip_map(&imaginary, Complex::new);
+        Self {
+            frequencies_hz: (first..end).map(|k| k as f64 / span_s).collect(),
+            coefficients: coefficients.row_iter().map(|row| row.transpose()).collect(),
+        }
     }
 }
 
@@ -128,7 +132,7 @@ pub(super) struct Parameters<'a> {
     /// What drives the modes: the lower triangle of a factor of its spectral matrix, the diagonal
     /// first, then by row, real and imaginary parts.
     forces: &'a [f64],
-    noise: f64,
+    pub noise: f64,
 }
 
 impl<'a> Parameters<'a> {
@@ -150,7 +154,7 @@ impl<'a> Parameters<'a> {
         self.shape_of_any_length(mode) / self.length(mode)
     }
 
-    fn length(&self, mode: usize) -> f64 {
+    pub fn length(&self, mode: usize) -> f64 {
         let length = self.shape_of_any_length(mode).norm();
         length.max(f64::MIN_POSITIVE)
     }
@@ -169,7 +173,7 @@ impl<'a> Parameters<'a> {
     }
 
     /// Row `row` and column `column` of the factor.
-    fn force(&self, row: usize, column: usize) -> Complex<f64> {
+    pub fn force(&self, row: usize, column: usize) -> Complex<f64> {
         if row == column {
             return Complex::new(self.forces[row], 0.0);
         }
@@ -186,30 +190,8 @@ impl<'a> Parameters<'a> {
 }
 
 /// Place of a factor beside the diagonal among the forces.
-fn force_at(modes: usize, row: usize, column: usize) -> usize {
+pub(super) fn force_at(modes: usize, row: usize, column: usize) -> usize {
     modes + row * (row - 1) + 2 * column
-}
-
-/// Response of a mode's displacement to a force, in that to a steady one, with its derivatives by
-/// the logarithms of frequency and damping ratio.
-struct Response {
-    value: Complex<f64>,
-    by_ln_frequency: Complex<f64>,
-    by_ln_damping: Complex<f64>,
-}
-
-impl Response {
-    fn of(mode: &Mode, frequency_hz: f64) -> Self {
-        let ratio = frequency_hz / mode.frequency_hz;
-        let damped = Complex::new(0.0, 2.0 * mode.damping * ratio);
-        let value = (Complex::from(1.0 - ratio * ratio) + damped).inv();
-        let square = value * value;
-        Self {
-            value,
-            by_ln_frequency: square * (damped - 2.0 * ratio * ratio),
-            by_ln_damping: -square * damped,
-        }
-    }
 }
 
 /// The integral over all frequencies of the square of a mode's response to a force.
@@ -501,133 +483,53 @@ fn is_inside(x: f64, limits: Bounds) -> bool {
 /// Minus the logarithm of the likelihood of some modes, with the prior on the damping.
 pub(super) struct Likelihood<'a> {
     pub observed: &'a Observed,
+    /// 1 to 4.
     pub modes: usize,
 }
 
-/// The expected spectral matrix of the motions at one frequency, and what it is made of.
-struct Expected {
-    /// By mode.
-    responses: Vec<Response>,
-    /// What each part of the forces moves: the motions' expected products are the sum of theirs,
-    /// and the noise.
-    moved: Vec<Coefficient>,
-    matrix: SMatrix<Complex<f64>, MOTIONS, MOTIONS>,
-}
-
 impl Likelihood<'_> {
-    fn expected(&self, parameters: &Parameters, shapes: &[Shape], k: usize) -> Expected {
-        let (frequency_hz, gust) = (self.observed.frequencies_hz[k], self.observed.gusts[k]);
-        let mut responses = Vec::with_capacity(self.modes);
-        for m in 0..self.modes {
-            responses.push(Response::of(&parameters.mode(m), frequency_hz));
-        }
-        let noise = Complex::from(parameters.noise);
-        let mut matrix = SMatrix::from_diagonal_element(noise);
-        let mut moved = Vec::with_capacity(self.modes);
-        for column in 0..self.modes {
-            let mut by_part = Coefficient::zeros();
-            for row in column..self.modes {
-                let by = responses[row].value * parameters.force(row, column) * gust;
-                by_part += shapes[row].map(|s| by * s);
-            }
-            matrix += by_part * by_part.adjoint();
-            moved.push(by_part);
-        }
-        Expected {
-            responses,
-            moved,
-            matrix,
-        }
-    }
-
     fn prior(parameters: &Parameters) -> f64 {
         let dampings = parameters.ln_dampings.iter();
         dampings.map(|d| 0.5 * damping_penalty(*d)).sum()
     }
+
+    fn value_of<const M: usize>(&self, parameters: &Parameters) -> f64 {
+        Spanned::<M>::of(self.observed, parameters).value()
+    }
+
+    fn add_slopes<const M: usize>(&self, parameters: &Parameters, slopes: &mut DVector<f64>) {
+        Spanned::<M>::of(self.observed, parameters).add_slopes(slopes);
+    }
 }
 
+// The number of modes is known to the compiler, or this takes longer.
 impl Cost for Likelihood<'_> {
     fn value(&self, x: &[f64]) -> f64 {
         let parameters = Parameters::of(self.modes, x);
-        let shapes: Vec<Shape> = (0..self.modes).map(|m| parameters.shape(m)).collect();
-        let mut cost = Self::prior(&parameters);
-        for (k, coefficient) in self.observed.coefficients.iter().enumerate() {
-            let expected = self.expected(&parameters, &shapes, k);
-            let Some(factored) = expected.matrix.cholesky() else {
-                return f64::INFINITY;
-            };
-            let factor = factored.l_dirty();
-            for i in 0..MOTIONS {
-                cost += 2.0 * factor[(i, i)].re.ln();
-            }
-            let Some(white) = factor.solve_lower_triangular(coefficient) else {
-                return f64::INFINITY;
-            };
-            cost += white.norm_squared();
-        }
-        cost
+        let cost = match self.modes {
+            1 => self.value_of::<1>(&parameters),
+            2 => self.value_of::<2>(&parameters),
+            3 => self.value_of::<3>(&parameters),
+            4 => self.value_of::<4>(&parameters),
+            _ => f64::INFINITY,
+        };
+        Self::prior(&parameters) + cost
     }
 
-    /// With E the expected matrix and G = E⁻¹ - E⁻¹zzᴴE⁻¹, a change dE changes the cost by tr(G dE).
-    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
-        let modes = self.modes;
-        let parameters = Parameters::of(modes, x);
-        let shapes: Vec<Shape> = (0..modes).map(|m| parameters.shape(m)).collect();
-        let mut cost = Self::prior(&parameters);
+    fn slopes(&self, x: &[f64]) -> DVector<f64> {
+        let parameters = Parameters::of(self.modes, x);
         let mut slopes = DVector::zeros(x.len());
-        let first_force = 2 * modes + modes * MOTIONS;
-        let mut of_shapes = vec![Shape::zeros(); modes];
+        match self.modes {
+            1 => self.add_slopes::<1>(&parameters, &mut slopes),
+            2 => self.add_slopes::<2>(&parameters, &mut slopes),
+            3 => self.add_slopes::<3>(&parameters, &mut slopes),
+            4 => self.add_slopes::<4>(&parameters, &mut slopes),
+            _ => {}
+        }
         for (m, ln_damping) in parameters.ln_dampings.iter().enumerate() {
-            slopes[modes + m] += LN_DAMPING_WEIGHT * (ln_damping - USUAL_DAMPING.ln());
+            slopes[self.modes + m] += LN_DAMPING_WEIGHT * (ln_damping - USUAL_DAMPING.ln());
         }
-        for (k, coefficient) in self.observed.coefficients.iter().enumerate() {
-            let gust = self.observed.gusts[k];
-            let expected = self.expected(&parameters, &shapes, k);
-            let Some(factored) = expected.matrix.cholesky() else {
-                return (f64::INFINITY, slopes);
-            };
-            for i in 0..MOTIONS {
-                cost += 2.0 * factored.l_dirty()[(i, i)].re.ln();
-            }
-            let white = factored.solve(coefficient);
-            cost += coefficient.dotc(&white).re;
-            let by_matrix = factored.inverse() - white * white.adjoint();
-            slopes[x.len() - 1] += parameters.noise * by_matrix.trace().re;
-            for column in 0..modes {
-                let by_moved = by_matrix * expected.moved[column];
-                for row in column..modes {
-                    let response = &expected.responses[row];
-                    let force = parameters.force(row, column) * gust;
-                    of_shapes[row] +=
-                        by_moved.map(|u| 2.0 * (response.value * force * u.conj()).re);
-                    let mut on_shape = Complex::from(0.0);
-                    for (u, s) in by_moved.iter().zip(&shapes[row]) {
-                        on_shape += u.conj() * *s;
-                    }
-                    let by_response = 2.0 * on_shape * force;
-                    slopes[row] += (by_response * response.by_ln_frequency).re;
-                    slopes[modes + row] += (by_response * response.by_ln_damping).re;
-                    let by_force = 2.0 * on_shape * response.value * gust;
-                    if row == column {
-                        slopes[first_force + row] += by_force.re;
-                    } else {
-                        let at = first_force + force_at(modes, row, column);
-                        slopes[at] += by_force.re;
-                        slopes[at + 1] -= by_force.im;
-                    }
-                }
-            }
-        }
-        for (m, by_shape) in of_shapes.iter().enumerate() {
-            // Along itself a shape changes nothing: its length is 1.
-            let across = by_shape - shapes[m] * shapes[m].dot(by_shape);
-            let across = across / parameters.length(m);
-            let at = 2 * modes + m * MOTIONS;
-            slopes
-                .rows_mut(at, MOTIONS)
-                .copy_from_slice(across.as_slice());
-        }
-        (cost, slopes)
+        slopes
     }
 }
 
@@ -685,35 +587,130 @@ mod tests {
         Band::of(&spectrum, Bounds::new(0.4, 1.2)).expect("a band")
     }
 
-    #[test]
-    fn slopes_are_those_of_the_cost() {
-        let band = band();
-        let start = |frequency_hz: f64| Start {
-            frequency_hz,
-            shape: band.shape_near(frequency_hz),
-        };
-        let mut x = band.first(&[start(0.6), start(0.7), start(0.95)]);
+    /// Starts of a search at some frequencies, a little off.
+    fn near(band: &Band, frequencies_hz: &[f64]) -> Vec<f64> {
+        let mut starts = Vec::new();
+        for &frequency_hz in frequencies_hz {
+            starts.push(Start {
+                frequency_hz,
+                shape: band.shape_near(frequency_hz),
+            });
+        }
+        let mut x = band.first(&starts);
         for (i, x) in x.iter_mut().enumerate() {
             *x += 0.1 * (i as f64 * 1.7).sin();
         }
-        let cost = Likelihood {
-            observed: &band.observed,
-            modes: 3,
-        };
-        let (value, slopes) = cost.value_and_slopes(&x);
-        assert!((value - cost.value(&x)).abs() < 1e-9 * value.abs());
-        for i in 0..x.len() {
-            let sides = [1e-5, -1e-5].map(|by| {
-                let mut there = x.clone();
-                there[i] += by;
-                cost.value(&there)
-            });
-            let difference = (sides[0] - sides[1]) / 2e-5;
-            let off = (difference - slopes[i]).abs();
+        x
+    }
+
+    /// By the whole spectral matrix of the motions.
+    fn cost_by_definition(band: &Band, modes: usize, x: &[f64]) -> f64 {
+        let parameters = Parameters::of(modes, x);
+        let mut cost = Likelihood::prior(&parameters);
+        for (k, coefficient) in band.observed.coefficients.iter().enumerate() {
+            let noise = Complex::from(parameters.noise);
+            let mut matrix = SMatrix::<_, MOTIONS, MOTIONS>::from_diagonal_element(noise);
+            for part in 0..modes {
+                let mut moved = Coefficient::zeros();
+                for m in part..modes {
+                    let Mode {
+                        frequency_hz,
+                        damping,
+                    } = parameters.mode(m);
+                    let ratio = band.observed.frequencies_hz[k] / frequency_hz;
+                    let stiff = Complex::new(1.0 - ratio * ratio, 2.0 * damping * ratio);
+                    let by = parameters.force(m, part) * band.observed.gusts[k] / stiff;
+                    moved += parameters.shape(m).map(|s| by * s);
+                }
+                matrix += moved * moved.adjoint();
+            }
+            let inverse = matrix.try_inverse().expect("noise in all directions");
+            cost += matrix.determinant().re.ln() + coefficient.dotc(&(inverse * coefficient)).re;
+        }
+        cost
+    }
+
+    #[test]
+    fn the_cost_is_that_of_the_whole_spectral_matrix() {
+        let band = band();
+        for frequencies_hz in [&[0.6][..], &[0.6, 0.95], &[0.6, 0.7, 0.9, 1.1]] {
+            let modes = frequencies_hz.len();
+            let mut x = near(&band, frequencies_hz);
+            let cost = Likelihood {
+                observed: &band.observed,
+                modes,
+            };
+            let wanted = cost_by_definition(&band, modes, &x);
+            let found = cost.value(&x);
             assert!(
-                off < 1e-4 * (1.0 + difference.abs()),
-                "{i}: {difference}, not {}",
-                slopes[i]
+                (found - wanted).abs() < 1e-9 * wanted.abs(),
+                "{modes} modes: {found}, not {wanted}"
+            );
+            // Modes of one shape span a direction less.
+            let (first, last) = (2 * modes, 2 * modes + (modes - 1) * MOTIONS);
+            x.copy_within(first..first + MOTIONS, last);
+            let wanted = cost_by_definition(&band, modes, &x);
+            let found = cost.value(&x);
+            assert!(
+                (found - wanted).abs() < 1e-9 * wanted.abs(),
+                "{modes} modes, two of one shape: {found}, not {wanted}"
+            );
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_cost() {
+        let band = band();
+        for frequencies_hz in [&[0.6][..], &[0.6, 0.95], &[0.6, 0.7, 0.95]] {
+            let x = near(&band, frequencies_hz);
+            let cost = Likelihood {
+                observed: &band.observed,
+                modes: frequencies_hz.len(),
+            };
+            let slopes = cost.slopes(&x);
+            for i in 0..x.len() {
+                let sides = [1e-5, -1e-5].map(|by| {
+                    let mut there = x.clone();
+                    there[i] += by;
+                    cost.value(&there)
+                });
+                let difference = (sides[0] - sides[1]) / 2e-5;
+                let off = (difference - slopes[i]).abs();
+                assert!(
+                    off < 1e-4 * (1.0 + difference.abs()),
+                    "{i}: {difference}, not {}",
+                    slopes[i]
+                );
+            }
+        }
+    }
+
+    /// Against the definition, at uneven times.
+    #[test]
+    fn a_spectrum_is_the_sum_over_all_frames() {
+        let times_s: Vec<f64> = (0..90)
+            .map(|k| 3.0 + 0.1 * f64::from(k) + 0.02 * f64::from(k * k % 7))
+            .collect();
+        let motion: Vec<f64> = times_s.iter().map(|t| (3.1 * t).sin() + 0.2 * t).collect();
+        let span_s = times_s[89] - times_s[0];
+        let within_hz = Bounds::new(0.3, 2.0);
+        let found = Spectrum::of(std::slice::from_ref(&motion), &times_s, within_hz);
+        assert_eq!(found.frequencies_hz.len(), found.coefficients.len());
+        let ends = (
+            found.frequencies_hz[0],
+            found.frequencies_hz.last().copied(),
+        );
+        assert_eq!(ends, (3.0 / span_s, Some((2.0 * span_s).floor() / span_s)));
+        for (frequency_hz, coefficient) in found.frequencies_hz.iter().zip(&found.coefficients) {
+            let mut wanted = Complex::from(0.0);
+            for (time_s, at) in times_s.iter().zip(&motion) {
+                wanted += Complex::from_polar(*at, -TAU * frequency_hz * time_s);
+            }
+            wanted *= (2.0 * span_s).sqrt() / 90.0;
+            assert!(
+                (coefficient[0] - wanted).norm() < 1e-10 * (1.0 + wanted.norm()),
+                "{frequency_hz} Hz: {}, not {wanted}",
+                coefficient[0]
             );
         }
     }

@@ -8,6 +8,7 @@ mod branches;
 mod celerite;
 mod decay;
 mod dominant_peaks;
+mod driven_likelihood;
 mod driven_modes;
 mod driven_oscillators;
 mod film;

@@ -281,6 +281,13 @@ impl Cost for Likelihood<'_> {
         self.value_and_slopes(x).0
     }
 
+    fn slopes(&self, x: &[f64]) -> DVector<f64> {
+        self.value_and_slopes(x).1
+    }
+}
+
+impl Likelihood<'_> {
+    /// The value, and its first derivatives.
     fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
         let count = self.oscillators;
         let rest = OF_OSCILLATOR * count;

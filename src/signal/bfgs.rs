@@ -19,8 +19,8 @@ const SECOND_DIFFERENCE: f64 = 1e-2;
 pub trait Cost {
     fn value(&self, x: &[f64]) -> f64;
 
-    /// The value, and its first derivatives.
-    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>);
+    /// The first derivatives.
+    fn slopes(&self, x: &[f64]) -> DVector<f64>;
 }
 
 /// A function whose derivatives are not known: they are found by differences.
@@ -31,9 +31,8 @@ impl<F: Fn(&[f64]) -> f64> Cost for ByDifferences<F> {
         self.0(x)
     }
 
-    fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
-        let value = self.0(x);
-        (value, slopes_by_differences(&self.0, x, value))
+    fn slopes(&self, x: &[f64]) -> DVector<f64> {
+        slopes_by_differences(&self.0, x)
     }
 }
 
@@ -58,7 +57,7 @@ pub fn minimum(
     let n = from.len();
     let mut x = from.to_vec();
     clamp(&mut x, bounds);
-    let (mut value, mut slopes) = cost.value_and_slopes(&x);
+    let (mut value, mut slopes) = (cost.value(&x), cost.slopes(&x));
     let mut inverse = DMatrix::<f64>::identity(n, n) * FIRST_INVERSE;
     let mut small_steps = 0;
     for _ in 0..stopping.max_steps {
@@ -66,10 +65,10 @@ pub fn minimum(
             break;
         }
         let direction = descent(&mut inverse, &slopes);
-        let Some(next) = line_search(cost, &x, value, &direction, bounds) else {
+        let Some((next, next_value)) = line_search(cost, &x, value, &direction, bounds) else {
             break;
         };
-        let (next_value, next_slopes) = cost.value_and_slopes(&next);
+        let next_slopes = cost.slopes(&next);
         let moved = DVector::from_iterator(n, next.iter().zip(&x).map(|(a, b)| a - b));
         update(&mut inverse, &moved, &(&next_slopes - &slopes));
         let gain = value - next_value;
@@ -107,14 +106,14 @@ fn descent(inverse: &mut DMatrix<f64>, gradient: &DVector<f64>) -> DVector<f64> 
     direction
 }
 
-/// The first place along `direction` that is lower.
+/// The first place along `direction` that is lower, and the value there.
 fn line_search(
     cost: &impl Cost,
     x: &[f64],
     value: f64,
     direction: &DVector<f64>,
     bounds: &[Bounds],
-) -> Option<Vec<f64>> {
+) -> Option<(Vec<f64>, f64)> {
     let mut share = 1.0;
     for _ in 0..TRIES {
         let mut next = x.to_vec();
@@ -122,26 +121,31 @@ fn line_search(
             *x += share * d;
         }
         clamp(&mut next, bounds);
-        if cost.value(&next) < value {
-            return Some(next);
+        let there = cost.value(&next);
+        if there < value {
+            return Some((next, there));
         }
         share *= SHORTER;
     }
     None
 }
 
-/// The inverse of the curvature after a step `moved` that changed the gradient by `turned`.
+/// The inverse of the curvature after a step `moved` that changed the gradient by `turned` (Nocedal
+/// and Wright 2006, eq. 6.17, multiplied out).
 fn update(inverse: &mut DMatrix<f64>, moved: &DVector<f64>, turned: &DVector<f64>) {
     let product = moved.dot(turned);
     if product <= 1e-12 {
         return;
     }
-    let identity = DMatrix::<f64>::identity(moved.len(), moved.len());
-    let a = identity - moved * turned.transpose() / product;
-    *inverse = &a * &*inverse * a.transpose() + moved * moved.transpose() / product;
+    let expected = &*inverse * turned;
+    let longer = (1.0 + turned.dot(&expected) / product) / product;
+    inverse.ger(longer, moved, moved, 1.0);
+    inverse.ger(-1.0 / product, &expected, moved, 1.0);
+    inverse.ger(-1.0 / product, moved, &expected, 1.0);
 }
 
-fn slopes_by_differences(f: &impl Fn(&[f64]) -> f64, x: &[f64], value: f64) -> DVector<f64> {
+fn slopes_by_differences(f: &impl Fn(&[f64]) -> f64, x: &[f64]) -> DVector<f64> {
+    let value = f(x);
     let mut out = DVector::zeros(x.len());
     for i in 0..x.len() {
         let mut there = x.to_vec();
@@ -194,7 +198,7 @@ pub fn curvature_of_slopes(cost: &impl Cost, x: &[f64]) -> DMatrix<f64> {
         let sides = [DIFFERENCE, -DIFFERENCE].map(|by| {
             let mut there = x.to_vec();
             there[i] += by;
-            cost.value_and_slopes(&there).1
+            cost.slopes(&there)
         });
         let second = (&sides[0] - &sides[1]) / (2.0 * DIFFERENCE);
         h.set_column(i, &second);

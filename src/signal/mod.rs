@@ -6,6 +6,7 @@ pub mod extension;
 pub mod gram;
 pub mod interpolation;
 pub mod least_squares;
+pub mod ln_product;
 mod local_affine;
 pub mod principal;
 pub mod qr;
