@@ -3,8 +3,9 @@
 mod support;
 
 use arborcam::config::Config;
-use arborcam::model::Unidentified;
+use arborcam::model::{Luma, Unidentified};
 use arborcam::outline::{AutoOutline, Found};
+use arborcam::track::WholeView;
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -820,28 +821,56 @@ fn the_tree_is_found_without_an_outline() {
         "{hits} of {} points are on the tree",
         bound.len()
     );
+}
 
-    let mut search = AutoOutline::new(&Config::default().outline);
+/// A camera that trembles by some pixels moves all that it films, and the tree is found all the
+/// same.
+#[test]
+fn the_outline_is_found_by_a_camera_that_trembles() {
+    let still = outline_found(&[[0, 0]]);
+    assert!(still >= 0.8, "{still:.2}");
+    let trembling = outline_found(&[[0, 0], [2, -1], [3, 0], [1, 2], [-2, 1], [-3, -2], [-1, 0]]);
+    assert!(trembling >= 0.8, "{trembling:.2}");
+}
+
+/// Intersection over union of the outline that was drawn, and the one that is found where each
+/// frame in turn is shifted by the next of `shifts`, px.
+fn outline_found(shifts: &[[i32; 2]]) -> f64 {
+    let config = Config::default();
+    let (mut search, mut view) = (
+        AutoOutline::new(&config.outline),
+        WholeView::new(&config.track),
+    );
     let mut decode = support::decoding();
     let frames = (0..recording().len()).map(|k| support::decoded(&mut decode, k));
     let outline = frames
-        .into_iter()
-        .find_map(|f| match search.step(&f.luma, f.time_s) {
-            Found::Tree(outline) => Some(outline),
-            _ => None,
+        .zip(shifts.iter().cycle())
+        .find_map(|(mut frame, shift)| {
+            shift_picture(&mut frame.luma, *shift);
+            let camera = view.step(&frame);
+            match search.step(&frame.luma, frame.time_s, &camera) {
+                Found::Tree(outline) => Some(outline),
+                Found::NotYet(_) | Found::NoMotion(_) => None,
+            }
         })
         .expect("an outline");
-    let count = |both: fn(bool, bool) -> bool| {
-        outline
-            .mask
-            .iter()
-            .zip(&given.mask)
-            .filter(|(a, b)| both(**a != 0, **b != 0))
-            .count() as f64
-    };
-    let iou = count(|a, b| a && b) / count(|a, b| a || b);
-    println!(
-        "intersection over union of the outline that is found and the one that is drawn: {iou:.2}"
-    );
-    assert!(iou >= 0.8, "{iou:.2}");
+    let given = support::outline();
+    let (mut both, mut either) = (0.0, 0.0);
+    for (a, b) in outline.mask.iter().zip(&given.mask) {
+        both += f64::from(u8::from(*a != 0 && *b != 0));
+        either += f64::from(u8::from(*a != 0 || *b != 0));
+    }
+    println!("intersection over union: {:.2}", both / either);
+    both / either
+}
+
+/// Moves a picture; its edge goes on where it has left.
+fn shift_picture(luma: &mut Luma, [across, down]: [i32; 2]) {
+    let before = luma.pixels.clone();
+    let (width, height) = (luma.size.width as i32, luma.size.height as i32);
+    for (i, pixel) in (0..).zip(&mut luma.pixels) {
+        let u = (i % width - across).clamp(0, width - 1);
+        let v = (i / width - down).clamp(0, height - 1);
+        *pixel = before[(v * width + u) as usize];
+    }
 }

@@ -3,7 +3,7 @@
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
-use crate::model::{Background, CameraMotion, Size, TrackSet};
+use crate::model::{Agreement, Background, CameraMotion, Size, TrackSet};
 use nalgebra::{Point2, Similarity2, UnitComplex, Vector2};
 use std::fs::File;
 use std::io::Write;
@@ -52,12 +52,8 @@ impl<W: Write> CameraCsv<W> {
         table.number(motion.isometry.rotation.angle().to_degrees(), 7);
         table.number(motion.scaling(), 9);
         match set.camera.background {
-            Background::Seen(agreement) => {
-                table.count(agreement.inliers);
-                table.number(agreement.rms_px, 4);
-                table.number(agreement.sd_px, 4);
-                table.text("seen");
-            }
+            Background::Seen(agreement) => agreed(table, agreement, "seen"),
+            Background::Foot(agreement) => agreed(table, agreement, "foot"),
             Background::Unclear => nothing_seen(table, "unclear"),
             Background::Lost => nothing_seen(table, "lost"),
         }
@@ -72,6 +68,13 @@ impl<W: Write> CameraCsv<W> {
     pub fn finish(self) -> Result<W, WriteError> {
         self.table.finish()
     }
+}
+
+fn agreed<W: Write>(table: &mut TableWriter<W>, agreement: Agreement, background: &str) {
+    table.count(agreement.inliers);
+    table.number(agreement.rms_px, 4);
+    table.number(agreement.sd_px, 4);
+    table.text(background);
 }
 
 fn nothing_seen<W: Write>(table: &mut TableWriter<W>, background: &str) {

@@ -183,9 +183,12 @@ pub struct Quality {
     #[serde(default)]
     pub camera_shake_hz: Option<f64>,
     /// Shares of the frames in which what stands still around the tree showed the camera's motion,
-    /// and of those in which that was lost, as the camera was turned, zoomed or covered, 0 to 1.
+    /// of those in which the foot of the trunk did in its place, and of those in which the
+    /// background was lost, as the camera was turned, zoomed or covered, 0 to 1.
     #[serde(default)]
     pub camera_seen_share: Option<f64>,
+    #[serde(default)]
+    pub camera_by_foot_share: Option<f64>,
     #[serde(default)]
     pub camera_lost_share: Option<f64>,
     /// How sure the forks of the tree are, 0 to 1: the median over the forks.

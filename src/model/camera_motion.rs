@@ -28,6 +28,9 @@ pub struct Agreement {
 pub enum Background {
     /// Where the camera looks.
     Seen(Agreement),
+    /// Nothing, but the foot of the trunk shows how far the picture has shifted. The deviation is
+    /// that at the foot: a turn or a zoom of the camera is not seen, and remains.
+    Foot(Agreement),
     /// Nothing: the motion is that of the last frame in which it was known.
     Unclear,
     /// It was seen well, and has been gone or far off its place for a while: the camera was turned,
@@ -56,12 +59,19 @@ impl CameraMotion {
         self.filmed_from_steady.inverse_transform_point(&filmed_px)
     }
 
+    /// The two rows of the matrix that takes `(u, v, 1)` of a steady place to where it was filmed,
+    /// px.
+    pub fn affine_rows(&self) -> [f64; 6] {
+        let matrix = self.filmed_from_steady.to_homogeneous();
+        std::array::from_fn(|k| matrix[(k / 3, k % 3)])
+    }
+
     /// Standard deviation within the outline, px; `None` where the background does not show the
     /// motion.
     pub fn sd_px(&self) -> Option<f64> {
         match self.background {
             Background::Seen(agreement) => Some(agreement.sd_px),
-            Background::Unclear | Background::Lost => None,
+            Background::Foot(_) | Background::Unclear | Background::Lost => None,
         }
     }
 

@@ -73,8 +73,11 @@ pub struct CaptureFacts {
     pub sway: Option<SwayFacts>,
     /// How the camera shakes; `None` where that is not known.
     pub shake: Option<Shake>,
-    /// Nothing around the tree shows how it moves.
+    /// Nothing around the tree shows how it moves, nor does the foot of the trunk.
     pub is_camera_unknown: bool,
+    /// Nothing but the foot of the trunk shows how it moves: its shift is known, not its turn.
+    #[serde(default)]
+    pub is_camera_by_foot: bool,
     /// Since when the camera looks elsewhere, s since the first frame; `None` where it does not, or
     /// where that is not known.
     pub camera_moved_at_s: Option<f64>,
@@ -235,9 +238,16 @@ impl CaptureFacts {
     }
 
     fn hides_shake(&self) -> Option<Finding> {
-        self.is_camera_unknown.then(|| Finding {
+        let reason = if self.is_camera_unknown {
+            "nothing around the tree shows how the camera moves"
+        } else if self.is_camera_by_foot {
+            "nothing around the tree but its foot shows how the camera moves"
+        } else {
+            return None;
+        };
+        Some(Finding {
             grade: Grade::Fair,
-            reason: "nothing around the tree shows how the camera moves".into(),
+            reason: reason.into(),
             advice: "film more of the ground and of what stands still".into(),
         })
     }

@@ -19,6 +19,14 @@ pub struct Foot {
     pub basis: FootBasis,
 }
 
+/// A row of the trunk in an outline: its columns, the last one included, px.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TrunkRow {
+    pub v: u32,
+    pub first: u32,
+    pub last: u32,
+}
+
 /// What the place of a foot rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -77,6 +85,34 @@ impl Foot {
         }
     }
 
+    /// The trunk in `outline`, from the foot up to this share of the outline's height, or as far as
+    /// it is no wider than a trunk can be.
+    pub fn trunk_rows(&self, outline: &Outline, share: f64) -> Vec<TrunkRow> {
+        let Some([_, top, _, bottom]) = outline.bounds_px() else {
+            return Vec::new();
+        };
+        let height = f64::from(bottom - top) + 1.0;
+        let lowest = self.position_px.y as u32;
+        let highest = f64::from(lowest) - share * height;
+        let mut below = TrunkRow {
+            v: lowest,
+            first: (self.position_px.x - self.half_width_px).max(0.0) as u32,
+            last: (self.position_px.x + self.half_width_px) as u32,
+        };
+        let mut rows = Vec::new();
+        for v in (highest.max(0.0) as u32..=lowest).rev() {
+            let Some(row) = row_above(outline, below, v) else {
+                break;
+            };
+            if f64::from(row.last - row.first + 1) > THICKEST_TRUNK * height {
+                break;
+            }
+            rows.push(row);
+            below = row;
+        }
+        rows
+    }
+
     /// The same at the lower end of the line that the user drew along the trunk, where that is in
     /// the `picture`.
     pub fn at_drawn_trunk(self, line_px: &[Point2<f64>], picture: Size) -> Self {
@@ -91,6 +127,21 @@ impl Foot {
             ..self
         }
     }
+}
+
+/// The part of the row `v` of an outline that goes on from the row `below`: all that is joined to
+/// the columns of that; `None` where nothing is.
+fn row_above(outline: &Outline, below: TrunkRow, v: u32) -> Option<TrunkRow> {
+    let width = outline.size.width;
+    let has = |u: &u32| outline.has(*u, v);
+    let columns = below.first..=below.last.min(width.saturating_sub(1));
+    let first = columns.clone().find(has)?;
+    let last = columns.rev().find(has)?;
+    Some(TrunkRow {
+        v,
+        first: (0..=first).rev().take_while(has).last()?,
+        last: (last..width).take_while(has).last()?,
+    })
 }
 
 /// A part of the lowest rows of an outline, apart from others by columns without outline.
@@ -186,6 +237,19 @@ mod tests {
         // A speck that moved, but is joined to nothing.
         let foot = Foot::of(&outline(&[CROWN, TRUNK, [70, 100, 71, 101]]), Some(60.0));
         assert_eq!(foot.position_px, Point2::new(30.5, 99.0));
+    }
+
+    #[test]
+    fn a_trunk_goes_up_as_far_as_it_is_one() {
+        let leaning = [[28, 80, 33, 99], [30, 60, 35, 79]];
+        let outline = outline(&[CROWN, leaning[0], leaning[1], [70, 60, 75, 98]]);
+        let foot = Foot::of(&outline, None);
+        let rows = foot.trunk_rows(&outline, 0.3);
+        assert!(rows.iter().map(|row| row.v).eq((70..=99).rev()), "{rows:?}");
+        let ends = [rows.first(), rows.last()].map(|row| row.map(|row| (row.first, row.last)));
+        assert_eq!(ends, [Some((28, 33)), Some((30, 35))]);
+        let rows = foot.trunk_rows(&outline, 1.0);
+        assert_eq!(rows.last().map(|row| row.v), Some(61), "no crown");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub use branch_graph::{BranchGraph, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
-pub use foot::{Foot, FootBasis};
+pub use foot::{Foot, FootBasis, TrunkRow};
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
 };

@@ -39,7 +39,7 @@ impl TrackLog {
         self.tentative.note(&set);
         self.remove(&set.rejected.iter().copied().collect());
         if set.camera.background == Background::Lost {
-            self.forget_unclear();
+            self.forget_unseen();
             return Vec::new();
         }
         let oldest_s = set.time_s - self.remembered_s;
@@ -49,10 +49,10 @@ impl TrackLog {
         self.sets.drain(..n_old).collect()
     }
 
-    /// Forgets the newest sets as far as their background was unclear.
-    fn forget_unclear(&mut self) {
-        let is_unclear = |set: &Arc<TrackSet>| set.camera.background == Background::Unclear;
-        while self.sets.back().is_some_and(is_unclear) {
+    /// Forgets the newest sets as far as their background was not seen.
+    fn forget_unseen(&mut self) {
+        let is_unseen = |set: &Arc<TrackSet>| set.camera.sd_px().is_none();
+        while self.sets.back().is_some_and(is_unseen) {
             self.sets.pop_back();
         }
     }

@@ -160,6 +160,7 @@ mod tests {
             }),
             shake: None,
             is_camera_unknown: false,
+            is_camera_by_foot: false,
             camera_moved_at_s: None,
             cut_at_s: None,
         }
@@ -277,6 +278,18 @@ mod tests {
             },
             "fair, because: shakes 1.5 px at 2.2 Hz. To do: shelter the camera from wind and load \
              the tripod",
+        );
+        check(
+            "a tree before the sky",
+            |f| f.is_camera_unknown = true,
+            "fair, because: nothing around the tree shows how the camera moves. To do: film more of \
+             the ground and of what stands still",
+        );
+        check(
+            "a tree before the sky, with its foot",
+            |f| f.is_camera_by_foot = true,
+            "fair, because: nothing around the tree but its foot shows how the camera moves. To do: \
+             film more of the ground and of what stands still",
         );
         check(
             "somebody kicked the tripod in the dark",

@@ -1,10 +1,11 @@
 //! The outline found by itself: what moves over the first seconds and was elsewhere in the first
-//! picture, without the shadow, closed to one region.
+//! picture, without the shadow, closed to one region. Pictures are compared with the camera's
+//! motion taken off.
 
 use super::steady::steadiness;
-use super::{region, trunk};
+use super::{region, still, trunk};
 use crate::config;
-use crate::model::{Luma, Outline, Size};
+use crate::model::{CameraMotion, Luma, Outline, Size};
 use crate::signal::median;
 use nalgebra::Point2;
 
@@ -63,9 +64,19 @@ pub struct AutoOutline {
     sum_sq: Vec<f32>,
     last: Vec<f32>,
     sum_change_sq: Vec<f32>,
-    /// Reduced pictures with their times, s; the first is the one that the outline is for.
-    kept: Vec<(f64, Luma)>,
+    /// The first is the one that the outline is for.
+    kept: Vec<Kept>,
+    /// Pixels at the picture's border that the camera's motion has brought in, reduced, px.
+    border_px: f64,
     keep_every_s: f64,
+}
+
+/// A picture that is kept, reduced and with the camera's motion taken off.
+struct Kept {
+    time_s: f64,
+    picture: Luma,
+    /// What was taken off.
+    camera: CameraMotion,
 }
 
 /// What the gathering has come to.
@@ -93,6 +104,7 @@ impl AutoOutline {
             last: Vec::new(),
             sum_change_sq: Vec::new(),
             kept: Vec::new(),
+            border_px: 0.0,
             keep_every_s: KEEP_EVERY_S,
         }
     }
@@ -100,13 +112,13 @@ impl AutoOutline {
     /// Tracking will begin at `time_s`, not at the first picture: the outline is to be that of
     /// then.
     pub fn begin_at(&mut self, time_s: f64) {
-        let before = self.kept.partition_point(|(t, _)| *t < time_s);
+        let before = self.kept.partition_point(|kept| kept.time_s < time_s);
         self.kept
             .drain(..before.min(self.kept.len().saturating_sub(1)));
     }
 
-    /// Takes the next picture, seen at `time_s`.
-    pub fn step(&mut self, luma: &Luma, time_s: f64) -> Found {
+    /// Takes the next picture, seen at `time_s` by a camera that has moved so since the first one.
+    pub fn step(&mut self, luma: &Luma, time_s: f64, camera: &CameraMotion) -> Found {
         let start_s = *self.start_s.get_or_insert_with(|| {
             self.scale = luma.size.width.div_ceil(REDUCED_WIDTH).max(1);
             self.reduced = Size::new(
@@ -118,8 +130,19 @@ impl AutoOutline {
             (self.last, self.sum_change_sq) = (zero.clone(), zero);
             time_s
         });
-        let picture = self.add(luma);
-        self.keep(picture, time_s);
+        match still::without_motion(luma, camera) {
+            Ok(steady) => {
+                let picture = self.add(&steady);
+                self.keep(Kept {
+                    time_s,
+                    picture,
+                    camera: *camera,
+                });
+                let moved_px = camera.farthest_px(&luma.size.corners_px());
+                self.border_px = self.border_px.max(moved_px / f64::from(self.scale));
+            }
+            Err(e) => tracing::error!("a {} picture without the camera's motion: {e}", luma.size),
+        }
         let gathered_s = time_s - start_s;
         if gathered_s < self.settings.gather_s {
             return Found::NotYet(gathered_s / self.settings.gather_s);
@@ -147,7 +170,9 @@ impl AutoOutline {
             None
         })?;
         // The border is traced anew at full size, so that it encloses just the pixels of the mask.
-        region::close_to_one(size, &enlarged(&small, size, self.scale), 0).unwrap_or_else(|e| {
+        let camera = self.kept.first()?.camera;
+        let mask = enlarged(&small, size, self.scale, &camera);
+        region::close_to_one(size, &mask, 0).unwrap_or_else(|e| {
             tracing::error!("automatic outline: {e}");
             None
         })
@@ -164,7 +189,7 @@ impl AutoOutline {
             .kept
             .iter()
             .step_by(step)
-            .map(|(_, picture)| picture)
+            .map(|kept| &kept.picture)
             .collect();
         let trunk = trunk::stand(size, &mut mask, &steadiness(&compared));
         let Some(one) = closed(size, &mask)? else {
@@ -181,14 +206,14 @@ impl AutoOutline {
     /// The pixels that move and were tree in the first picture, 255 there and 0 elsewhere; `None`
     /// if hardly anything moves.
     fn moving_tree(&self) -> Option<Vec<u8>> {
-        let (_, first) = self.kept.first().filter(|_| self.count >= 2.0)?;
+        let first = self.kept.first().filter(|_| self.count >= 2.0)?;
         let moving = self.moving();
         let count = moving.iter().filter(|m| **m).count();
         if (count as f64) < LEAST_MOVING * self.reduced.area() as f64 {
             return None;
         }
         let mut mask = self.median_over_time();
-        for ((pixel, first), moves) in mask.iter_mut().zip(&first.pixels).zip(moving) {
+        for ((pixel, first), moves) in mask.iter_mut().zip(&first.picture.pixels).zip(moving) {
             let was_tree = moves && first.abs_diff(*pixel) >= OFF_MEDIAN;
             *pixel = if was_tree { 255 } else { 0 };
         }
@@ -206,28 +231,34 @@ impl AutoOutline {
         let quarter = sorted.len() / 4;
         let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
         let threshold = (ABOVE_QUIET * quiet).max(ABOVE_GREY);
-        deviation.iter().map(|&d| d > threshold).collect()
+        let size = self.reduced;
+        let border = self.border_px.round() as u32;
+        let columns = border..size.width.saturating_sub(border);
+        let rows = border..size.height.saturating_sub(border);
+        let mut moving = Vec::with_capacity(deviation.len());
+        for (i, d) in (0..).zip(deviation) {
+            let inside = columns.contains(&(i % size.width)) && rows.contains(&(i / size.width));
+            moving.push(inside && d > threshold);
+        }
+        moving
     }
 
     /// Median of every pixel over time.
     fn median_over_time(&self) -> Vec<u8> {
         let mut medians = Vec::with_capacity(self.reduced.area());
         for i in 0..self.reduced.area() {
-            let values = self.kept.iter().map(|(_, picture)| picture.pixels[i]);
+            let values = self.kept.iter().map(|kept| kept.picture.pixels[i]);
             medians.push(median(values.collect(), u8::cmp).unwrap_or(0));
         }
         medians
     }
 
-    fn keep(&mut self, picture: Luma, time_s: f64) {
-        if self
-            .kept
-            .last()
-            .is_some_and(|(last_s, _)| time_s - last_s < self.keep_every_s)
-        {
+    fn keep(&mut self, kept: Kept) {
+        let is_soon = |last: &Kept| kept.time_s - last.time_s < self.keep_every_s;
+        if self.kept.last().is_some_and(is_soon) {
             return;
         }
-        self.kept.push((time_s, picture));
+        self.kept.push(kept);
         if self.kept.len() > MOST_KEPT {
             let mut odd = false;
             self.kept.retain(|_| {
@@ -314,14 +345,18 @@ fn held(mask: &[u8], outline: &Outline) -> f64 {
     inside as f64 / of.max(1) as f64
 }
 
-/// The mask at full size.
-fn enlarged(small: &Outline, size: Size, scale: u32) -> Vec<u8> {
+/// The mask at full size, where it is in a picture of this camera.
+fn enlarged(small: &Outline, size: Size, scale: u32, camera: &CameraMotion) -> Vec<u8> {
     let mut mask = vec![0; size.area()];
     for (v, row) in mask.chunks_exact_mut(size.width as usize).enumerate() {
         for (u, m) in row.iter_mut().enumerate() {
-            let (su, sv) = (u as u32 / scale, v as u32 / scale);
-            if su < small.size.width && sv < small.size.height {
-                *m = small.mask[(sv * small.size.width + su) as usize];
+            let steady_px = camera.steady_px(Point2::new(u as f64, v as f64));
+            // The nearest pixel, and the cell that it was reduced into.
+            let [su, sv] = [steady_px.x, steady_px.y].map(|px| px.round() as i64);
+            let (su, sv) = (su.div_euclid(scale.into()), sv.div_euclid(scale.into()));
+            let inside = Point2::new(su as f64, sv as f64);
+            if small.size.contains(inside) {
+                *m = small.mask[(sv * i64::from(small.size.width) + su) as usize];
             }
         }
     }

@@ -10,6 +10,7 @@ mod region;
 mod scribbles;
 mod solve;
 mod steady;
+mod still;
 mod trunk;
 
 pub use auto::{AutoOutline, Found, whole};

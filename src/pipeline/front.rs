@@ -4,7 +4,7 @@ use super::back::Followed;
 use crate::config::Config;
 use crate::model::{Frame, Luma, Outline};
 use crate::outline::{AutoOutline, Found};
-use crate::track::Tracker;
+use crate::track::{Tracker, WholeView};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -20,6 +20,8 @@ pub struct FrontEnd {
     /// What the user gave; `None` finds it by motion.
     given: Option<Arc<Outline>>,
     search: AutoOutline,
+    /// The camera's motion while the outline is looked for.
+    view: WholeView,
     found: Option<(Arc<Outline>, Tracker)>,
     held: VecDeque<Frame>,
     next_id: u32,
@@ -36,6 +38,7 @@ impl FrontEnd {
             config: config.clone(),
             given: outline.map(Arc::new),
             search: AutoOutline::new(&config.outline),
+            view: WholeView::new(&config.track),
             found: None,
             held: VecDeque::new(),
             next_id: 0,
@@ -55,14 +58,7 @@ impl FrontEnd {
         if self.found.is_none() {
             match &self.given {
                 Some(outline) => self.settle(outline.clone()),
-                None => match self.search.step(&frame.luma, frame.time_s) {
-                    Found::NotYet(progress) => self.progress = progress,
-                    Found::Tree(outline) => self.settle(Arc::new(outline)),
-                    Found::NoMotion(outline) => {
-                        self.no_motion = true;
-                        self.settle(Arc::new(outline));
-                    }
-                },
+                None => self.search_in(&frame),
             }
         }
         self.held.push_back(frame);
@@ -102,6 +98,7 @@ impl FrontEnd {
         }
         self.given = outline.map(Arc::new).or(self.given.take());
         self.search = AutoOutline::new(&self.config.outline);
+        self.view = WholeView::new(&self.config.track);
         self.held.clear();
         (self.progress, self.no_motion) = (0.0, false);
     }
@@ -119,6 +116,19 @@ impl FrontEnd {
     /// A picture buffer that is no longer needed, to decode the next frame into.
     pub fn spare(&mut self) -> Option<Luma> {
         self.spare.take()
+    }
+
+    /// Looks for the outline in one more frame.
+    fn search_in(&mut self, frame: &Frame) {
+        let camera = self.view.step(frame);
+        match self.search.step(&frame.luma, frame.time_s, &camera) {
+            Found::NotYet(progress) => self.progress = progress,
+            Found::Tree(outline) => self.settle(Arc::new(outline)),
+            Found::NoMotion(outline) => {
+                self.no_motion = true;
+                self.settle(Arc::new(outline));
+            }
+        }
     }
 
     fn settle(&mut self, outline: Arc<Outline>) {

@@ -286,7 +286,8 @@ fn encode(set: &TrackSet, out: &mut Vec<u8>) {
     }
 }
 
-/// What is written where the background says nothing.
+/// What is written where the background says nothing. A negative deviation is that of the foot of
+/// the trunk, which served in its place.
 const NOT_SEEN: Agreement = Agreement {
     sd_px: f64::NAN,
     inliers: 0,
@@ -306,6 +307,10 @@ fn encode_camera(camera: &CameraMotion, out: &mut Vec<u8>) {
         rms_px,
     } = match camera.background {
         Background::Seen(agreement) => agreement,
+        Background::Foot(agreement) => Agreement {
+            sd_px: -agreement.sd_px,
+            ..agreement
+        },
         Background::Unclear => NOT_SEEN,
         Background::Lost => Agreement {
             sd_px: f64::INFINITY,
@@ -328,6 +333,11 @@ fn decode_camera(bytes: &[u8]) -> Option<CameraMotion> {
         background: match sd_px {
             sd_px if sd_px.is_nan() => Background::Unclear,
             f64::INFINITY => Background::Lost,
+            sd_px if sd_px.is_sign_negative() => Background::Foot(Agreement {
+                sd_px: -sd_px,
+                inliers,
+                rms_px,
+            }),
             sd_px => Background::Seen(Agreement {
                 sd_px,
                 inliers,
@@ -409,13 +419,18 @@ mod tests {
             time_s: frame as f64 / 30.0,
             camera: CameraMotion {
                 filmed_from_steady: Similarity2::new(Vector2::new(1.5, frame as f64), 0.01, 1.1),
-                background: match frame % 3 {
+                background: match frame % 4 {
                     0 => Background::Seen(Agreement {
                         sd_px: 0.01,
                         inliers: 120,
                         rms_px: 0.1,
                     }),
                     1 => Background::Unclear,
+                    2 => Background::Foot(Agreement {
+                        sd_px: 0.0,
+                        inliers: 14,
+                        rms_px: 0.2,
+                    }),
                     _ => Background::Lost,
                 },
             },

@@ -1,6 +1,6 @@
 //! What is said when a tree comes into effect.
 
-use super::shaking::ShakeMeter;
+use super::shaking::{CameraShownBy, ShakeMeter};
 use super::shared::Shared;
 use crate::model::{Background, FootBasis, Shake, TrackSet, WoodSight};
 use crate::solve::Model;
@@ -24,7 +24,11 @@ const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wa
 const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera moves: what it shakes \
                               cannot be separated from the tree's sway; use a firm tripod, and film \
                               more of the ground and of what stands still";
-/// It is given with the tree, after so much film, s.
+/// That where it is known by the foot of the trunk alone.
+const CAMERA_BY_FOOT: &str = "nothing around the outline shows how the camera moves: the foot of the \
+                              trunk shows how far it shifts, and not how it turns; film more of the \
+                              ground and of what stands still";
+/// They are given with the tree, after so much film, s.
 const CAMERA_JUDGED_S: f64 = 3.0;
 
 /// The tree that was last told of.
@@ -36,7 +40,7 @@ pub struct Announced {
     wood: WoodSight,
     /// What was said of the camera: that it looks elsewhere, is not known, trembles.
     is_lost: bool,
-    is_unclear: bool,
+    shown_by: CameraShownBy,
     shakes: bool,
     /// Time of the first frame, s.
     begun_s: Option<f64>,
@@ -122,14 +126,28 @@ impl Announced {
             }
         }
         let is_judged = self.tree.is_some() && time_s - begun_s >= CAMERA_JUDGED_S;
-        let is_unclear = is_judged && !meter.so_far().is_known();
-        if is_unclear != self.is_unclear && !is_lost {
-            self.is_unclear = is_unclear;
-            match is_unclear {
-                true => shared.warn(CAMERA_UNCLEAR.into()),
-                false => shared.withdraw(CAMERA_UNCLEAR),
-            }
+        if is_judged && !is_lost {
+            self.tell_what_shows_camera(meter.so_far().shown_by(), shared);
         }
+        self.tell_of_shake(meter, shared);
+    }
+
+    /// Warns where the camera's motion is not known as well as it should be, and withdraws what is
+    /// not so any more.
+    fn tell_what_shows_camera(&mut self, shown_by: CameraShownBy, shared: &Shared) {
+        let before = std::mem::replace(&mut self.shown_by, shown_by);
+        if shown_by == before {
+            return;
+        }
+        camera_warning(before)
+            .into_iter()
+            .for_each(|warning| shared.withdraw(warning));
+        camera_warning(shown_by)
+            .into_iter()
+            .for_each(|warning| shared.warn(warning.into()));
+    }
+
+    fn tell_of_shake(&mut self, meter: &ShakeMeter, shared: &Shared) {
         if let Some(shake) = meter.newest().filter(Shake::is_strong)
             && !self.shakes
         {
@@ -141,6 +159,15 @@ impl Announced {
                 hz.unwrap_or_default()
             ));
         }
+    }
+}
+
+/// The warning where the camera's motion is not known as well as it should be.
+fn camera_warning(shown_by: CameraShownBy) -> Option<&'static str> {
+    match shown_by {
+        CameraShownBy::Background => None,
+        CameraShownBy::Foot => Some(CAMERA_BY_FOOT),
+        CameraShownBy::Nothing => Some(CAMERA_UNCLEAR),
     }
 }
 

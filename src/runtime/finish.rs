@@ -75,6 +75,7 @@ impl Quality {
             camera_shake_px: shaking.shake.map(|shake| shake.rms_px),
             camera_shake_hz: shaking.shake.and_then(|shake| shake.frequency_hz),
             camera_seen_share: Some(shaking.seen_share),
+            camera_by_foot_share: Some(shaking.by_foot_share),
             camera_lost_share: Some(shaking.lost_share),
             tracks_total: self.tracks_total(),
             tracks_rejected: self.rejected,

@@ -1,6 +1,7 @@
 //! What a capture is judged by: the facts of one that is at its end, or goes on.
 
 use super::finish::{CaptureJob, Quality, timing};
+use super::shaking::CameraShownBy;
 use crate::config::Dynamics;
 use crate::dynamics::Take;
 use crate::model::{
@@ -59,7 +60,8 @@ impl JudgedFilm<'_> {
             foot: self.foot,
             sway: self.sway,
             shake: shaking.shake,
-            is_camera_unknown: !shaking.is_known(),
+            is_camera_unknown: shaking.shown_by() == CameraShownBy::Nothing,
+            is_camera_by_foot: shaking.shown_by() == CameraShownBy::Foot,
             camera_moved_at_s: shaking.lost_since_s,
             cut_at_s: None,
         }

@@ -20,6 +20,7 @@ pub struct ShakeMeter {
     sum_square_px2: f64,
     frames: u64,
     seen: u64,
+    by_foot: u64,
     lost: u64,
     lost_since_s: Option<f64>,
 }
@@ -30,17 +31,37 @@ pub struct Shaking {
     /// Its trembling where the tree is, at the frequency at which it trembled most; `None` for less
     /// than five seconds in which it was known.
     pub shake: Option<Shake>,
-    /// Shares of the frames in which the background showed it, and in which that was lost, 0 to 1.
+    /// Shares of the frames in which the background showed it, in which the foot of the trunk did
+    /// in its place, and in which the background was lost, 0 to 1.
     pub seen_share: f64,
+    pub by_foot_share: f64,
     pub lost_share: f64,
     /// Since when it is lost, s; `None` where it is not at the end.
     pub lost_since_s: Option<f64>,
 }
 
+/// What shows how the camera moves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CameraShownBy {
+    /// What stands still around the tree.
+    #[default]
+    Background,
+    /// The foot of the trunk alone: how far it shifts, and not how it turns.
+    Foot,
+    /// Nothing: its motion cannot be told from the tree's.
+    Nothing,
+}
+
 impl Shaking {
-    /// Whether what stands still around the tree shows how the camera moves.
-    pub fn is_known(&self) -> bool {
-        self.seen_share >= KNOWN
+    /// What shows how the camera moves.
+    pub fn shown_by(&self) -> CameraShownBy {
+        if self.seen_share >= KNOWN {
+            CameraShownBy::Background
+        } else if self.seen_share + self.by_foot_share >= KNOWN {
+            CameraShownBy::Foot
+        } else {
+            CameraShownBy::Nothing
+        }
     }
 }
 
@@ -54,10 +75,11 @@ impl ShakeMeter {
         } else {
             self.lost_since_s = None;
         }
-        if tracks.camera.sd_px().is_none() {
-            return;
+        match tracks.camera.background {
+            Background::Seen(_) => self.seen += 1,
+            Background::Foot(_) => self.by_foot += 1,
+            Background::Unclear | Background::Lost => return,
         }
-        self.seen += 1;
         let middle = middle(tracks);
         self.times_s.push(tracks.time_s);
         self.shifts_px
@@ -95,6 +117,7 @@ impl ShakeMeter {
                 frequency_hz: strongest.frequency_hz,
             }),
             seen_share: self.seen as f64 / frames,
+            by_foot_share: self.by_foot as f64 / frames,
             lost_share: self.lost as f64 / frames,
             lost_since_s: self.lost_since_s,
         }
@@ -108,4 +131,41 @@ fn middle(tracks: &TrackSet) -> Point2<f64> {
         sum += observation.at_px().coords;
     }
     Point2::from(sum / tracks.observations.len().max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Agreement;
+
+    #[test]
+    fn the_foot_shows_how_the_camera_moves_where_the_background_does_not() {
+        use CameraShownBy::{Background as Surroundings, Foot, Nothing};
+        let [seen, foot] = [Background::Seen, Background::Foot].map(|of| of(Agreement::default()));
+        for (backgrounds, expected) in [
+            ([seen, seen, foot, Background::Unclear], Surroundings),
+            ([seen, foot, foot, Background::Unclear], Foot),
+            ([seen, foot, Background::Lost, Background::Unclear], Foot),
+            (
+                [
+                    foot,
+                    Background::Unclear,
+                    Background::Lost,
+                    Background::Unclear,
+                ],
+                Nothing,
+            ),
+        ] {
+            let mut meter = ShakeMeter::default();
+            for (k, background) in (0..4_u32).zip(backgrounds) {
+                let mut set = TrackSet {
+                    time_s: f64::from(k),
+                    ..TrackSet::default()
+                };
+                set.camera.background = background;
+                meter.note(&set);
+            }
+            assert_eq!(meter.so_far().shown_by(), expected, "{backgrounds:?}");
+        }
+    }
 }

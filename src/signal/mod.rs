@@ -20,5 +20,5 @@ pub mod vectors;
 pub use local_affine::{Fit, Witness, local_affine};
 pub use principal::along_principal_direction;
 pub use segments::{distance_to_segment, segments_cross};
-pub use similarity::{CommonMotion, Pair};
+pub use similarity::{CAUCHY, CommonMotion, Pair, sd_of_misses};
 pub use statistics::median;

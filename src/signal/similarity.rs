@@ -3,10 +3,11 @@
 use super::statistics::{median, median_vector};
 use nalgebra::{Matrix2x4, Matrix4, Point2, Similarity2, UnitComplex, Vector2, Vector4};
 
-/// Rounds of reweighting (Holland and Welsch 1977), and the tuning constant of Cauchy's weights,
-/// which keeps 95 % efficiency on normal errors.
+/// Rounds of reweighting (Holland and Welsch 1977).
 const ROUNDS: usize = 12;
-const CAUCHY: f64 = 2.385;
+/// The tuning constant of Cauchy's weights, which keeps 95 % efficiency on normal errors (Holland
+/// and Welsch 1977).
+pub const CAUCHY: f64 = 2.385;
 /// Median absolute deviation of a normal distribution times this is its standard deviation.
 const SD_PER_MAD: f64 = 1.4826;
 /// The least standard deviation of a place, px: none is found more exactly.
@@ -102,8 +103,13 @@ fn sd_px(pairs: &[Pair], motion: &Similarity2<f64>) -> Option<f64> {
         let miss = pair.miss_px(motion);
         misses.extend([miss.x.abs(), miss.y.abs()]);
     }
-    let mad = median(misses, f64::total_cmp)?;
-    Some((SD_PER_MAD * mad).max(LEAST_SD_PX))
+    Some(sd_of_misses(misses.into_iter())?.max(LEAST_SD_PX))
+}
+
+/// Standard deviation of what has these absolute misses, from their median; `None` of none.
+pub fn sd_of_misses(misses: impl Iterator<Item = f64>) -> Option<f64> {
+    let mad = median(misses.collect(), f64::total_cmp)?;
+    Some(SD_PER_MAD * mad)
 }
 
 /// What a, b, c, d do to the place `at`.

@@ -9,13 +9,18 @@ mod background;
 mod carry;
 mod detect;
 mod flow;
+mod landmarks;
 mod neighbours;
 mod point;
 mod regain;
 mod register;
+mod template;
 mod trial;
+mod trunk_foot;
+mod whole_view;
 
 pub use detect::Detector;
+pub use whole_view::WholeView;
 
 use crate::config::{Detect, Track};
 use crate::model::{self, CameraMotion, Frame, Observation, Outline, TrackId, TrackSet};
@@ -24,6 +29,7 @@ use anchor::Anchors;
 use background::Background;
 use carry::{carry_hidden, neighbour_fits};
 use flow::{Flow, OpticalFlow, Pyramid};
+use landmarks::Pictures;
 use nalgebra::{Point2, distance};
 use point::{Point, Record, Trial};
 use regain::Gaps;
@@ -145,10 +151,14 @@ impl Tracker {
         if !self.settings.steady {
             return CameraMotion::default();
         }
-        let levels = self.settings.levels;
-        let (previous, present) = (&self.previous, &self.present);
-        self.background
-            .step(frame, previous, present, levels, &mut self.flow)
+        let pictures = Pictures {
+            luma: &frame.luma,
+            time_s: frame.time_s,
+            previous: &self.previous,
+            present: &self.present,
+            levels: self.settings.levels,
+        };
+        self.background.step(&pictures, &mut self.flow)
     }
 
     /// Drops the points that were not seen for too long or have left the picture; those on trial

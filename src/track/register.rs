@@ -290,7 +290,7 @@ fn pixel_pair(pixels: &[u8], at: usize) -> Option<&[u8; 2]> {
 }
 
 /// Brightness between pixels; beyond the edge the edge goes on.
-fn bilinear(luma: &Luma, u_px: f32, v_px: f32) -> f32 {
+pub(super) fn bilinear(luma: &Luma, u_px: f32, v_px: f32) -> f32 {
     let (w, h) = (luma.size.width as i32, luma.size.height as i32);
     let u = u_px.clamp(0.0, (w - 1) as f32);
     let v = v_px.clamp(0.0, (h - 1) as f32);

@@ -132,8 +132,7 @@ fn light(picture: &Rgb, region: &[u8]) -> Option<[f64; 3]> {
 
 /// The picture with what stands still in its steady place.
 fn without_motion(picture: &Rgb, camera: &CameraMotion) -> opencv::Result<Rgb> {
-    let affine = camera.filmed_from_steady.to_homogeneous();
-    let rows: Vec<f64> = affine.transpose().iter().copied().take(6).collect();
+    let rows = camera.affine_rows();
     let affine = Mat::new_rows_cols_with_data(2, 3, &rows)?;
     let mut steady = Mat::default();
     let size = CvSize::new(picture.size.width as i32, picture.size.height as i32);

@@ -98,7 +98,7 @@ fn shake(s: &Snapshot, theme: Theme) -> Vec<Span<'static>> {
         (Some(Background::Lost), _) => return vec![Span::styled("turned away", theme.warning())],
         (Some(Background::Unclear), _) => return vec![Span::styled("not known", theme.warning())],
         (None, _) | (_, None) => return vec![Span::raw("–")],
-        (Some(Background::Seen(_)), Some(shake)) => shake,
+        (Some(Background::Seen(_) | Background::Foot(_)), Some(shake)) => shake,
     };
     let mut words = format!("{} px", value(shake.rms_px));
     if let Some(hz) = shake.frequency_hz {
