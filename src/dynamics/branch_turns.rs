@@ -47,8 +47,8 @@ pub(super) fn turn_of(
     let at = branches.binary_search(&branch).ok()?;
     let mut fit = Fit::new(tree, film, &points, &branches, frames);
     for _ in 0..STEPS {
-        fit.expect()?;
-        fit.maximise();
+        fit.find_angles()?;
+        fit.find_variances_and_arms();
     }
     Some(fit.angles.column(at).iter().copied().collect())
 }
@@ -205,7 +205,7 @@ impl Fit {
     }
 
     /// The angles from all else, and what no frame shows from them; `None` where numbers fail.
-    fn expect(&mut self) -> Option<()> {
+    fn find_angles(&mut self) -> Option<()> {
         let mut weighted = self.arms.clone();
         for (mut row, noise) in weighted.row_iter_mut().zip(&self.of_noise) {
             row /= *noise;
@@ -224,7 +224,7 @@ impl Fit {
     }
 
     /// Variances and arms from the angles.
-    fn maximise(&mut self) {
+    fn find_variances_and_arms(&mut self) {
         let frames = self.moved.nrows() as f64;
         let products = self.angles.tr_mul(&self.angles) + &self.unknown * frames;
         for (i, variance) in self.of_angles.iter_mut().enumerate() {
