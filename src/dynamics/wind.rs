@@ -62,7 +62,7 @@ const CI_INFLATION: f64 = 1.1;
 /// those of the branches on it.
 const MAX_CI_TO_SERVE: f64 = 2.0;
 /// The trunk's is an answer up to so many times.
-const MAX_CI_OF_TRUNK: f64 = 4.0;
+const MAX_CI_OF_TRUNK: f64 = 3.0;
 
 /// What is asked of an answer, by the points that it comes from. Found on made-up trees
 /// (tests/sway_trees.rs).
@@ -164,13 +164,12 @@ struct Speaking {
 
 impl BranchEstimator for InWind<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
-        if branch.node == self.trunk
-            && let Some((mode, sway)) = self.fundamental
-        {
-            self.known[branch.node.index()] = Known::Mode(mode);
-            return Ok(sway);
+        let by_own_points = self.by_own_points(branch);
+        if branch.node == self.trunk {
+            self.or_fundamental(branch, by_own_points)
+        } else {
+            by_own_points
         }
-        self.by_own_points(branch)
     }
 }
 
@@ -208,6 +207,21 @@ impl InWind<'_> {
 }
 
 impl InWind<'_> {
+    /// The trunk's sway: by its own points, if all points at once say the same or nothing. Its own
+    /// points say it more exactly, but where they are few a limb's sway is taken for its own.
+    fn or_fundamental(&mut self, branch: &BranchInFilm, by_own_points: Swaying) -> Swaying {
+        let Some((mode, sway)) = self.fundamental else {
+            return by_own_points;
+        };
+        if let (Ok(_), Known::Mode(own)) = (&by_own_points, self.known[branch.node.index()])
+            && is_of_ancestor(&own, &[mode])
+        {
+            return by_own_points;
+        }
+        self.known[branch.node.index()] = Known::Mode(mode);
+        Ok(sway)
+    }
+
     /// The sway of the whole tree from all points at once; `None` where these do not tell it. It is
     /// the one answer that every film should give, and as uncertain as it must be.
     fn whole_tree(&self) -> Option<(BranchMode, Sway)> {
@@ -222,8 +236,12 @@ impl InWind<'_> {
         let by_modes = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
         let by_modes = by_modes.filter(|o| !o.at_limit);
         let by_turn = self.by_turn_of_trunk(&points, &frames);
-        let found = together(by_modes, by_turn)?;
-        let mode = OWN_POINTS.mode_of(found.mode, &found.ln_sd);
+        // Where they contradict each other the turn is right more often (docs/design/sway.md).
+        let found = by_turn.as_ref().or(by_modes.as_ref())?;
+        let mut mode = OWN_POINTS.mode_of(found.mode, &found.ln_sd);
+        if let Some(other) = &by_modes {
+            mode = mode.agreed_with(&OWN_POINTS.mode_of(other.mode, &other.ln_sd));
+        }
         if !mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci)
             || self
                 .limits
@@ -453,35 +471,28 @@ impl OwnMotion {
     }
 }
 
-/// What two ways to one oscillator say together. Where they contradict each other the turn is right
-/// more often (docs/design/sway.md). Both are of one film: their mean is no surer than either.
-fn together(by_modes: Option<Oscillator>, by_turn: Option<Oscillator>) -> Option<Oscillator> {
-    let (by_modes, by_turn) = match (by_modes, by_turn) {
-        (Some(by_modes), Some(by_turn)) => (by_modes, by_turn),
-        (by_modes, by_turn) => return by_turn.or(by_modes),
-    };
-    let [a, b] = [&by_modes, &by_turn].map(|o| o.ln_sd.frequency);
-    if !by_modes
-        .mode
-        .has_frequency_of(&by_turn.mode, SAME_FREQ_SIGMAS * a.hypot(b))
-    {
-        return Some(by_turn);
+impl BranchMode {
+    /// The mean of both where they agree, else itself. Both are of one film: their mean is no surer
+    /// than either.
+    fn agreed_with(&self, other: &Self) -> Self {
+        if !is_of_ancestor(self, std::slice::from_ref(other)) {
+            return *self;
+        }
+        let [own, others] =
+            [self, other].map(|m| m.ln_sd.frequency.max(f64::MIN_POSITIVE).powi(-2));
+        let share = own / (own + others);
+        let between = |own: f64, other: f64| own.powf(share) * other.powf(1.0 - share);
+        Self {
+            mode: Mode {
+                frequency_hz: between(self.mode.frequency_hz, other.mode.frequency_hz),
+                damping: between(self.mode.damping, other.mode.damping),
+            },
+            ln_sd: LnDeviations {
+                frequency: (2.0 / (own + others)).sqrt(),
+                damping: between(self.ln_sd.damping, other.ln_sd.damping),
+            },
+        }
     }
-    let weights = [a, b].map(|sd| sd.max(f64::MIN_POSITIVE).powi(-2));
-    let share = weights[0] / (weights[0] + weights[1]);
-    let between = |a: f64, b: f64| a.powf(share) * b.powf(1.0 - share);
-    Some(Oscillator {
-        mode: Mode {
-            frequency_hz: between(by_modes.mode.frequency_hz, by_turn.mode.frequency_hz),
-            damping: between(by_modes.mode.damping, by_turn.mode.damping),
-        },
-        ln_sd: LnDeviations {
-            frequency: (2.0 / (weights[0] + weights[1])).sqrt(),
-            damping: between(by_modes.ln_sd.damping, by_turn.ln_sd.damping),
-        },
-        variance: between(by_modes.variance, by_turn.variance),
-        at_limit: false,
-    })
 }
 
 /// Root of the mean square displacement of a point.
