@@ -34,6 +34,11 @@ impl Bounds {
         self.lo <= x && x <= self.hi
     }
 
+    /// Whether `x` lies between the ends, at neither of them.
+    pub fn is_between(&self, x: f64) -> bool {
+        self.lo < x && x < self.hi
+    }
+
     /// The number within that is nearest to `x`.
     pub fn clamp(&self, x: f64) -> f64 {
         x.clamp(self.lo, self.hi)

@@ -43,9 +43,9 @@ pub(super) fn turn_of(
     frames: &[Vec<usize>],
 ) -> Option<Vec<f64>> {
     let points = points(film, frames);
-    let branches = branches_told_apart(tree, film, &points);
+    let branches = branches_told_apart(tree, &points);
     let at = branches.binary_search(&branch).ok()?;
-    let mut fit = Fit::new(tree, film, &points, &branches, frames);
+    let mut fit = Fit::new(tree, &points, &branches, frames.len());
     for _ in 0..STEPS {
         fit.find_angles()?;
         fit.find_variances_and_arms();
@@ -53,16 +53,32 @@ pub(super) fn turn_of(
     Some(fit.angles.column(at).iter().copied().collect())
 }
 
-/// Points that were seen for long enough, as indices of the film's tracks.
-fn points(film: &Film, frames: &[Vec<usize>]) -> Vec<usize> {
+/// A point, and where it was in each of the frames that are used.
+struct Place {
+    node: NodeId,
+    at_px: Vec<Point2<f64>>,
+}
+
+/// Points that were seen for long enough.
+fn points(film: &Film, frames: &[Vec<usize>]) -> Vec<Place> {
     let least = (MIN_SEEN_SHARE * frames.len() as f64).max(1.0);
-    let mut out = Vec::new();
-    for (k, track) in film.tracks.iter().enumerate() {
-        if count_seen(&places_px(track, frames)) as f64 >= least {
-            out.push(k);
+    let mut enough = Vec::new();
+    for track in &film.tracks {
+        let at_px = places_px(track, frames);
+        if count_seen(&at_px) as f64 >= least {
+            let node = track.node;
+            enough.push(Place { node, at_px });
         }
     }
-    evenly_chosen(&out, MOST_POINTS)
+    let all: Vec<usize> = (0..enough.len()).collect();
+    let chosen = evenly_chosen(&all, MOST_POINTS);
+    let mut out = Vec::with_capacity(chosen.len());
+    for (k, point) in enough.into_iter().enumerate() {
+        if chosen.binary_search(&k).is_ok() {
+            out.push(point);
+        }
+    }
+    out
 }
 
 /// Mean place in each of `frames`.
@@ -83,10 +99,10 @@ fn movers(tree: &BranchTree, node: NodeId) -> impl Iterator<Item = NodeId> + '_ 
 }
 
 /// Branches that some of the points are on or above, in order.
-fn branches_told_apart(tree: &BranchTree, film: &Film, points: &[usize]) -> Vec<NodeId> {
+fn branches_told_apart(tree: &BranchTree, points: &[Place]) -> Vec<NodeId> {
     let mut counts = vec![0.0; tree.len()];
-    for &k in points {
-        for branch in movers(tree, film.tracks[k].node) {
+    for point in points {
+        for branch in movers(tree, point.node) {
             counts[branch.index()] += 1.0;
         }
     }
@@ -131,31 +147,23 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(
-        tree: &BranchTree,
-        film: &Film,
-        points: &[usize],
-        branches: &[NodeId],
-        frames: &[Vec<usize>],
-    ) -> Self {
+    fn new(tree: &BranchTree, points: &[Place], branches: &[NodeId], frames: usize) -> Self {
         let signals = 2 * points.len();
         let mut out = Self {
-            moved: DMatrix::zeros(frames.len(), signals),
+            moved: DMatrix::zeros(frames, signals),
             lacking: Vec::new(),
             movers: Vec::with_capacity(points.len()),
             arms: DMatrix::zeros(signals, branches.len()),
             of_angles: DVector::from_element(branches.len(), FIRST_ANGLE.powi(2)),
             of_noise: DVector::from_element(signals, FIRST_NOISE_PX.powi(2)),
-            angles: DMatrix::zeros(frames.len(), branches.len()),
+            angles: DMatrix::zeros(frames, branches.len()),
             unknown: DMatrix::zeros(branches.len(), branches.len()),
         };
-        for &k in points {
-            let track = &film.tracks[k];
-            let at_px = places_px(track, frames);
-            let mean_px = mean_px(&at_px);
-            out.add_signals(&at_px, &mean_px);
+        for point in points {
+            let mean_px = mean_px(&point.at_px);
+            out.add_signals(&point.at_px, &mean_px);
             let mut of_point = Vec::new();
-            for branch in movers(tree, track.node) {
+            for branch in movers(tree, point.node) {
                 if let Ok(column) = branches.binary_search(&branch) {
                     let arm = mean_px - tree.branches[branch.index()].base_px;
                     of_point.push(Mover {

@@ -462,7 +462,7 @@ impl Band {
             out.push(DrivenMode {
                 mode,
                 ln_sd: LnDeviations { frequency, damping },
-                at_limit: !is_inside(ln_damping, limits) || !is_inside(ln_frequency, within),
+                at_limit: !limits.is_between(ln_damping) || !within.is_between(ln_frequency),
                 motions_px: &self.by_motion * shape * rms,
             });
         }
@@ -474,10 +474,6 @@ impl Band {
 fn gust(frequency_hz: f64, within_hz: Bounds) -> f64 {
     let middle_hz = (within_hz.lo * within_hz.hi).sqrt();
     (frequency_hz / middle_hz).powf(0.5 * GUST_EXPONENT)
-}
-
-fn is_inside(x: f64, limits: Bounds) -> bool {
-    limits.lo < x && x < limits.hi
 }
 
 /// Minus the logarithm of the likelihood of some modes, with the prior on the damping.

@@ -139,6 +139,11 @@ impl Film {
         out
     }
 
+    /// Mean time of each of `frames`, some neighbours taken together, s.
+    pub(super) fn times_of(&self, frames: &[Vec<usize>]) -> Vec<f64> {
+        frames.iter().map(|of| self.mean_s(of)).collect()
+    }
+
     /// Mean time of some frames, s.
     pub(super) fn mean_s(&self, frames: &[usize]) -> f64 {
         frames.iter().map(|&k| self.times_s[k]).sum::<f64>() / frames.len() as f64

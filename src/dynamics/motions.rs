@@ -37,7 +37,7 @@ impl Motions {
             motions.push(motion);
         }
         Self {
-            times_s: frames.iter().map(|of| film.mean_s(of)).collect(),
+            times_s: film.times_of(frames),
             along: motions,
             variances: principal.variances,
             directions: principal.directions,

@@ -21,8 +21,6 @@ const MOST_OSCILLATORS: usize = 2;
 const MOST_PEAKS: usize = 4;
 /// Oscillators are looked for between these shares of the frequency at which most moves.
 const BAND: Bounds = Bounds::new(0.3, 2.0);
-/// Variance of the slowest one at least, as a share of the largest.
-const MIN_VARIANCE: f64 = 0.1;
 /// Power of the gusts is given as a share of that at this frequency, Hz, and falls with some exponent:
 /// that of turbulence, with this standard deviation. One that is taken for known moves the frequency
 /// of an oscillator whose gusts have another by a percent.
@@ -46,32 +44,22 @@ const STOPPING: Stopping = Stopping {
     min_gain: 1e-3,
 };
 
-/// The slowest of the larger oscillators in `angles` at `times_s`, rad and s, about the largest one
-/// that is `within_hz`, by the likeliest fit; its variance in rad². `None` where there are too few
-/// frequencies or nothing moves, where chance explains the motion as well, and where `cancel` ends
-/// the work before.
-pub(super) fn slowest_oscillator(
+/// The oscillators in `angles` at `times_s`, rad and s, about the largest one that is `within_hz`, by
+/// the likeliest fit; their variances in rad². None where there are too few frequencies or nothing
+/// moves, where chance explains the motion as well, and where `cancel` ends the work before.
+pub(super) fn oscillators(
     angles: &[f64],
     times_s: &[f64],
     within_hz: Bounds,
     cancel: &CancelToken,
-) -> Option<Oscillator> {
-    let all = Powers::of(angles, times_s, within_hz)?;
-    let powers = Powers::of(angles, times_s, all.about_highest_hz())?;
-    let peaks_hz = powers.peaks_hz();
-    let mut fits = Vec::new();
-    for count in 0..=MOST_OSCILLATORS {
-        for start_hz in choices(&peaks_hz, count) {
-            if cancel.is_cancelled() {
-                return None;
-            }
-            fits.push(powers.fit(&start_hz, cancel));
-        }
-    }
-    let likeliest = fits
-        .iter()
-        .min_by(|a, b| a.criterion.total_cmp(&b.criterion))?;
-    powers.slowest(likeliest)
+) -> Vec<Oscillator> {
+    let all = Powers::of(angles, times_s, within_hz);
+    let about_highest = all.and_then(|all| Powers::of(angles, times_s, all.about_highest_hz()));
+    let Some(powers) = about_highest else {
+        return Vec::new();
+    };
+    let likeliest = powers.likeliest(cancel);
+    likeliest.map_or(Vec::new(), |fit| powers.oscillators(&fit))
 }
 
 /// All ways to choose `count` of some numbers, in their order.
@@ -122,16 +110,6 @@ impl Fit {
         let peak =
             self.x[2 * self.oscillators + k].exp() * gust(mode.frequency_hz, self.gust_exponent());
         peak * PI * mode.frequency_hz * mode.damping
-    }
-
-    /// The slowest oscillator whose variance is no small share of the largest.
-    fn slowest(&self) -> Option<usize> {
-        let largest = (0..self.oscillators)
-            .map(|k| self.variance(k))
-            .fold(0.0, f64::max);
-        let is_large = |k: &usize| self.variance(*k) >= MIN_VARIANCE * largest;
-        let large = (0..self.oscillators).filter(is_large);
-        large.min_by(|a, b| self.x[*a].total_cmp(&self.x[*b]))
     }
 }
 
@@ -213,36 +191,56 @@ impl Powers {
         }
     }
 
-    /// `None` where the fit has none, or its likelihood no top.
-    fn slowest(&self, fit: &Fit) -> Option<Oscillator> {
-        let (k, count) = (fit.slowest()?, fit.oscillators);
+    /// The likeliest fit of any number of oscillators; `None` where `cancel` ends the work before.
+    fn likeliest(&self, cancel: &CancelToken) -> Option<Fit> {
+        let peaks_hz = self.peaks_hz();
+        let mut fits = Vec::new();
+        for count in 0..=MOST_OSCILLATORS {
+            for start_hz in choices(&peaks_hz, count) {
+                if cancel.is_cancelled() {
+                    return None;
+                }
+                fits.push(self.fit(&start_hz, cancel));
+            }
+        }
+        let fits = fits.into_iter();
+        fits.min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    }
+
+    /// Those of a fit; one for whose frequency the likelihood has no top is at the limit.
+    fn oscillators(&self, fit: &Fit) -> Vec<Oscillator> {
+        let count = fit.oscillators;
         let likelihood = Likelihood {
             powers: self,
             oscillators: count,
         };
-        let known = Known::of(curvature_of_slopes(&likelihood, &fit.x))?;
+        let Some(known) = Known::of(curvature_of_slopes(&likelihood, &fit.x)) else {
+            return Vec::new();
+        };
         let ln_frequencies = self.within_hz.map(f64::ln);
-        let is_inside = is_inside(fit.x[k], ln_frequencies)
-            && is_inside(fit.x[count + k], DAMPING.map(f64::ln));
-        Some(Oscillator {
-            mode: fit.mode(k),
-            ln_sd: LnDeviations {
-                frequency: known.deviation(k)?,
-                damping: known.deviation(count + k).unwrap_or(f64::INFINITY),
-            },
-            variance: fit.variance(k) * self.mean,
-            at_limit: !is_inside,
-        })
+        let ln_dampings = DAMPING.map(f64::ln);
+        let mut out = Vec::with_capacity(count);
+        for k in 0..count {
+            let deviation = known.deviation(k);
+            let is_inside =
+                ln_frequencies.is_between(fit.x[k]) && ln_dampings.is_between(fit.x[count + k]);
+            out.push(Oscillator {
+                mode: fit.mode(k),
+                ln_sd: LnDeviations {
+                    frequency: deviation.unwrap_or(f64::INFINITY),
+                    damping: known.deviation(count + k).unwrap_or(f64::INFINITY),
+                },
+                variance: fit.variance(k) * self.mean,
+                at_limit: deviation.is_none() || !is_inside,
+            });
+        }
+        out
     }
 }
 
 /// Power of gusts.
 fn gust(frequency_hz: f64, exponent: f64) -> f64 {
     (frequency_hz / GUST_HZ).powf(exponent)
-}
-
-fn is_inside(x: f64, limits: Bounds) -> bool {
-    limits.lo < x && x < limits.hi
 }
 
 /// Minus the logarithm of the likelihood of some oscillators, with the priors on the damping and on
@@ -365,7 +363,12 @@ mod tests {
 
     fn found(frequencies_hz: &[f64], frames: usize, seed: u64) -> Option<Oscillator> {
         let (angles, times_s) = driven(frequencies_hz, frames, seed);
-        slowest_oscillator(&angles, &times_s, WITHIN_HZ, &CancelToken::new())
+        slowest(&angles, &times_s, &CancelToken::new())
+    }
+
+    fn slowest(angles: &[f64], times_s: &[f64], cancel: &CancelToken) -> Option<Oscillator> {
+        let all = oscillators(angles, times_s, WITHIN_HZ, cancel).into_iter();
+        all.min_by(|a, b| a.mode.frequency_hz.total_cmp(&b.mode.frequency_hz))
     }
 
     #[test]
@@ -393,13 +396,13 @@ mod tests {
         let mut random = generator(9, 0);
         let noise: Vec<f64> = (0..900).map(|_| random.random_range(-1.0..1.0)).collect();
         for angles in [vec![0.0; 900], vec![f64::NAN; 900], noise] {
-            let found = slowest_oscillator(&angles, &times_s, WITHIN_HZ, &CancelToken::new());
+            let found = slowest(&angles, &times_s, &CancelToken::new());
             assert!(found.is_none());
         }
         let cancel = CancelToken::new();
         cancel.cancel();
         let (angles, times_s) = driven(&[0.5], 900, 1);
-        assert!(slowest_oscillator(&angles, &times_s, WITHIN_HZ, &cancel).is_none());
+        assert!(slowest(&angles, &times_s, &cancel).is_none());
     }
 
     #[test]

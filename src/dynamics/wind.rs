@@ -21,7 +21,7 @@ use super::gap_free::GapFree;
 use super::members::{Points, mean_px};
 use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
-use super::turn_spectrum::slowest_oscillator;
+use super::turn_spectrum::oscillators;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
@@ -261,12 +261,11 @@ impl InWind<'_> {
     /// The slowest of the larger oscillators in the trunk's turn.
     fn by_turn_of_trunk(&self, points: &Points, frames: &[Vec<usize>]) -> Option<Oscillator> {
         let angles = turn_of(self.trunk, self.tree, self.film, frames)?;
-        let mut times_s = Vec::with_capacity(frames.len());
-        for frame in frames {
-            times_s.push(self.film.mean_s(frame));
-        }
+        let times_s = self.film.times_of(frames);
         let within_hz = self.sampling.frequencies_hz;
-        let mut found = slowest_oscillator(&angles, &times_s, within_hz, self.cancel)?;
+        let mut all = oscillators(&angles, &times_s, within_hz, self.cancel);
+        let slowest = *by_variance(&all, true).first()?;
+        let mut found = all.swap_remove(slowest);
         // From the square of an angle to that of all points' motion.
         let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
         found.variance *= self.arms_px2(base_px, points);
@@ -332,7 +331,7 @@ impl InWind<'_> {
         let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
         let problem = Problem {
-            times: Times::new(frames.iter().map(|of| self.film.mean_s(of)).collect()),
+            times: Times::new(self.film.times_of(&frames)),
             motions: motion.along_directions(&motion.all),
             known: motion.carried.clone(),
             ancestors: ancestors.iter().map(|a| a.mode).collect(),

@@ -175,7 +175,8 @@ angle's spectrum says. They are for reference. A short film's peak is as wide as
 that this damping is too high, and the largest peak may be that of a parent branch or of the whole tree. Of \
 a long film in wind, the spectrum is a mean over pieces of 20 s.</p>\
 <p>The <b>dominant peaks</b> of a level are those of the spectrum of the angle to the parent branch that at \
-least half of its branches have beyond a smooth background (Hu et al., section 5.4). The level counts forks from the foot, the trunk's is 1; the order is the botanical one, the \
+least half of its branches have beyond a smooth background (Hu et al., section 5.4). The level counts forks \
+from the foot, the trunk's is 1; the order is the botanical one, the \
 trunk's is 0.</p>\
 <p>In the plots of the angle the mean is taken off; the grey part before a release is not used. The dashed \
 curve is the part of the angle that has the branch's own frequency and damping; what is beyond it is the \

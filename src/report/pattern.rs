@@ -122,6 +122,12 @@ pub fn peaks_of(branch: &Branch) -> Vec<DominantPeak> {
     shared_peaks(&Vec::from_iter(spectrum_of(branch)))
 }
 
+fn has_peak(branch: &Branch, frequency_hz: f64, resolution_hz: f64) -> bool {
+    let peaks = peaks_of(branch);
+    let mut off_hz = peaks.iter().map(|p| (p.frequency_hz - frequency_hz).abs());
+    off_hz.any(|off_hz| off_hz <= resolution_hz)
+}
+
 fn spectrum_of(branch: &Branch) -> Option<&RelativeSpectrum> {
     branch.over_background.as_ref()
 }
@@ -194,16 +200,13 @@ fn common_peak(study: &Study, of_levels: &[DominantPeak], resolution_hz: f64) ->
     let powers = of_levels.iter().map(|p| p.over_background);
     let in_levels = study.branches.iter().filter(|b| LEVELS.contains(&b.level));
     let branches: Vec<&Branch> = in_levels.filter(|b| b.over_background.is_some()).collect();
-    let has_it = |branch: &&&Branch| {
-        let peaks = peaks_of(branch);
-        peaks
-            .iter()
-            .any(|p| (p.frequency_hz - frequency_hz).abs() <= resolution_hz)
-    };
+    let with_it = branches
+        .iter()
+        .filter(|b| has_peak(b, frequency_hz, resolution_hz));
     CommonPeak {
         frequency_hz,
         over_background: powers.fold(f64::INFINITY, f64::min),
-        branches_with: branches.iter().filter(has_it).count(),
+        branches_with: with_it.count(),
         branches: branches.len(),
     }
 }
