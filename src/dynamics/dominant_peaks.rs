@@ -98,12 +98,7 @@ fn of_piece(
     }
     let mean = own.iter().sum::<f64>() / own.len() as f64;
     own.iter_mut().for_each(|x| *x -= mean);
-    Some(Periodogram::within(
-        piece,
-        &own_times_s,
-        &own,
-        frequencies_hz,
-    ))
+    Some(Periodogram::of(piece, &own_times_s, &own, frequencies_hz))
 }
 
 /// The power law that fits best, by least squares of logarithms, at these frequencies; `None` where

@@ -13,22 +13,20 @@ use super::branches::{
     BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
     from_the_trunk_up,
 };
-use super::celerite::Times;
 use super::decay::Mode;
-use super::driven_oscillators::{Fitted, Oscillator, Problem};
+use super::driven_modes::Spectrum;
+use super::driven_oscillators::{Driven, Oscillator, about_highest_hz};
 use super::film::Film;
 use super::gap_free::GapFree;
 use super::members::{Points, mean_px};
 use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
-use super::turn_spectrum::oscillators;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
 use crate::signal::principal::{PrincipalComponents, along};
 use crate::signal::qr::Qr;
 use crate::signal::vectors::dot;
 use nalgebra::Point2;
-use std::cell::RefCell;
 
 /// Points of a branch and of its carrier that are needed.
 const MIN_POINTS: usize = 2;
@@ -53,8 +51,9 @@ const SAME_FREQ_SIGMAS: f64 = 2.0;
 /// An oscillator is one swing if its points move alike in time, each by a lever of its own, to a
 /// share of the squares ([`rank_one_fraction`]), and if such a share of them has it.
 const MIN_POINTS_SHARE: f64 = 0.75;
-/// What drifts forgets itself so often in a film.
-const DRIFTS_PER_FILM: f64 = 4.0;
+/// Oscillators in a trunk's turn, and in a branch beyond its ancestors', at most.
+const MOST_OF_TRUNK: usize = 2;
+const MOST_OF_BRANCH: usize = 3;
 /// The curvature of the likelihood is that at its top, and gusts are no exact process: intervals
 /// are so much wider. Found on made-up trees (tests/sway_trees.rs).
 const CI_INFLATION: f64 = 1.1;
@@ -262,8 +261,10 @@ impl InWind<'_> {
     fn by_turn_of_trunk(&self, points: &Points, frames: &[Vec<usize>]) -> Option<Oscillator> {
         let angles = turn_of(self.trunk, self.tree, self.film, frames)?;
         let times_s = self.film.times_of(frames);
-        let within_hz = self.sampling.frequencies_hz;
-        let mut all = oscillators(&angles, &times_s, within_hz, self.cancel);
+        let within_hz = about_highest_hz(&angles, &times_s, self.sampling.frequencies_hz);
+        let turn = Driven::new(&[angles], &[], &times_s, Vec::new(), within_hz)?;
+        let fit = turn.likeliest(MOST_OF_TRUNK, self.cancel)?;
+        let mut all = fit.oscillators();
         let slowest = *by_variance(&all, true).first()?;
         let mut found = all.swap_remove(slowest);
         // From the square of an angle to that of all points' motion.
@@ -330,20 +331,17 @@ impl InWind<'_> {
         let frames = self.sampling.frames_with(&[points, carrier])?;
         let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
-        let problem = Problem {
-            times: Times::new(self.film.times_of(&frames)),
-            motions: motion.along_directions(&motion.all),
-            known: motion.carried.clone(),
-            ancestors: ancestors.iter().map(|a| a.mode).collect(),
-            drift_per_s: DRIFTS_PER_FILM / self.film.span_s(),
-            had: RefCell::default(),
-        };
-        let left = motion.along_directions(&motion.own);
-        let frequencies_hz = self.sampling.frequencies_hz;
-        let fitted = problem.fit(&left, motion.noise, frequencies_hz, self.cancel);
-        if self.cancel.is_cancelled() {
-            return Err(Unidentified::NotInTime);
-        }
+        let times_s = self.film.times_of(&frames);
+        let driven = Driven::new(
+            &motion.along_directions(&motion.all),
+            &motion.carried,
+            &times_s,
+            ancestors.iter().map(|a| a.mode).collect(),
+            self.sampling.frequencies_hz,
+        );
+        let driven = driven.ok_or(Unidentified::TooShort)?;
+        let fitted = driven.likeliest(MOST_OF_BRANCH, self.cancel);
+        let fitted = fitted.ok_or(Unidentified::NotInTime)?;
         let found = fitted.oscillators();
         let k = own_oscillator(&found, &ancestors, criteria)?;
         let mode = criteria.mode_of(found[k].mode, &found[k].ln_sd);
@@ -351,7 +349,9 @@ impl InWind<'_> {
         if found[k].ln_sd.frequency <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
             return Err(Unidentified::TooUncertain);
         }
-        motion.check_one_swing(&fitted, k, criteria)?;
+        let shares = fitted.shares(k, motion.noise_px2_per_hz(&times_s));
+        let own = Spectrum::of(&motion.own, &times_s, self.sampling.frequencies_hz);
+        check_one_swing(&own, &shares, criteria)?;
         // Gusts are not known well enough for a likelihood to tell a frequency from its mirror
         // image at such a rate.
         if self
@@ -398,7 +398,7 @@ struct OwnMotion {
     all: Vec<Vec<f64>>,
     /// What of it is no multiple of the carrier's motions.
     own: Vec<Vec<f64>>,
-    /// A constant, and the motions of the carrier's points.
+    /// The motions of the carrier's points.
     carried: Vec<Vec<f64>>,
     /// The one or two directions, in all signals at once, in which most of the own motion is.
     directions: Vec<Vec<f64>>,
@@ -414,15 +414,16 @@ impl OwnMotion {
             noise,
         } = GapFree::of(points, frames);
         let carrier = GapFree::of(carrier, frames);
-        let mut carried = vec![vec![1.0; frames.len()]];
+        let mut carried = Vec::new();
         let of_carrier = PrincipalComponents::of_signals(&carrier.signals);
         for (direction, variance) in of_carrier.directions.iter().zip(&of_carrier.variances) {
             let is_clear = *variance > MIN_VARIANCE_OVER_NOISE * carrier.noise;
-            if is_clear && carried.len() <= MAX_CARRIED_MOTIONS {
+            if is_clear && carried.len() < MAX_CARRIED_MOTIONS {
                 carried.push(along(&carrier.signals, direction));
             }
         }
-        let qr = Qr::new(carried.clone());
+        let constant = vec![1.0; frames.len()];
+        let qr = Qr::new([&[constant], carried.as_slice()].concat());
         let own: Vec<Vec<f64>> = all.iter().map(|s| qr.solve(s).0).collect();
         let values = (points.tracks.len() * frames.len()) as f64;
         if rms_px(&all, values) < NOISE_PX {
@@ -451,22 +452,10 @@ impl OwnMotion {
         self.directions.iter().map(|d| along(signals, d)).collect()
     }
 
-    /// Whether an oscillator moves the points as one swing.
-    fn check_one_swing(
-        &self,
-        fitted: &Fitted,
-        oscillator: usize,
-        criteria: &AcceptanceCriteria,
-    ) -> Result<(), Unidentified> {
-        let filter = fitted
-            .filter(oscillator, self.noise)
-            .ok_or(Unidentified::TooUncertain)?;
-        let filtered: Vec<Vec<f64>> = self.own.iter().map(|s| filter.of(s)).collect();
-        let swing = rank_one_fraction(&filtered);
-        if swing.of_squares < criteria.min_rank_one || swing.of_points < MIN_POINTS_SHARE {
-            return Err(Unidentified::NoOscillation);
-        }
-        Ok(())
+    /// Power of the noise, px²/Hz.
+    fn noise_px2_per_hz(&self, times_s: &[f64]) -> f64 {
+        let span_s = times_s.last().copied().unwrap_or(0.0) - times_s[0];
+        2.0 * self.noise * span_s / times_s.len() as f64
     }
 }
 
@@ -492,6 +481,27 @@ impl BranchMode {
             },
         }
     }
+}
+
+/// Whether an oscillator that has these shares of the power moves the points as one swing. Real and
+/// imaginary parts of coefficients are as good as values in time (Parseval).
+fn check_one_swing(
+    own: &Spectrum,
+    shares: &[f64],
+    criteria: &AcceptanceCriteria,
+) -> Result<(), Unidentified> {
+    let signals = own.coefficients.first().map_or(0, |c| c.len());
+    let mut filtered = vec![Vec::with_capacity(2 * shares.len()); signals];
+    for (coefficients, share) in own.coefficients.iter().zip(shares) {
+        for (signal, coefficient) in filtered.iter_mut().zip(coefficients) {
+            signal.extend([share * coefficient.re, share * coefficient.im]);
+        }
+    }
+    let swing = rank_one_fraction(&filtered);
+    if swing.of_squares < criteria.min_rank_one || swing.of_points < MIN_POINTS_SHARE {
+        return Err(Unidentified::NoOscillation);
+    }
+    Ok(())
 }
 
 /// Root of the mean square displacement of a point.
