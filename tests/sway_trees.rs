@@ -237,7 +237,7 @@ fn wind_where_only_the_tips_have_points() {
         seconds: 120.0,
         ..Filming::default()
     };
-    let found = run_with(400..412, Drive::Wind, &filming, |tree| {
+    let found = run_with(400..430, Drive::Wind, &filming, |tree| {
         let carries = |b: usize| tree.branches.iter().any(|c| c.parent == Some(b));
         tree.film.tracks.retain(|t| !carries(t.node.index() - 1));
     });

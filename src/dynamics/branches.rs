@@ -15,6 +15,12 @@ use nalgebra::Point2;
 /// Share of half the rate of the frames up to which frequencies are looked for.
 pub(super) const BELOW_NYQUIST: f64 = 0.9;
 
+/// Frequencies that are nearer to each other than so many standard deviations are one.
+const SAME_FREQ_SIGMAS: f64 = 2.0;
+/// The interval of the trunk, which all points move with and every film should show, may be so many
+/// times as wide as that of others.
+pub(super) const MAX_CI_OF_TRUNK: f64 = 3.0;
+
 /// Where modes are looked for.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SearchLimits {
@@ -75,6 +81,36 @@ impl BranchMode {
     /// Whether half the 95 % interval of the frequency is at most this share of it.
     pub fn is_within(&self, max_relative_ci: f64) -> bool {
         Interval::Z * self.ln_sd.frequency <= max_relative_ci
+    }
+
+    /// Whether both frequencies may be one.
+    pub fn agrees_with(&self, other: &Self) -> bool {
+        let sd = self.ln_sd.frequency.hypot(other.ln_sd.frequency);
+        other
+            .mode
+            .has_frequency_of(&self.mode, SAME_FREQ_SIGMAS * sd)
+    }
+
+    /// The mean of both where they agree, else itself. Both are of one film: their mean is no surer
+    /// than either.
+    pub fn agreed_with(&self, other: &Self) -> Self {
+        if !self.agrees_with(other) {
+            return *self;
+        }
+        let [own, others] =
+            [self, other].map(|m| m.ln_sd.frequency.max(f64::MIN_POSITIVE).powi(-2));
+        let share = own / (own + others);
+        let between = |own: f64, other: f64| own.powf(share) * other.powf(1.0 - share);
+        Self {
+            mode: Mode {
+                frequency_hz: between(self.mode.frequency_hz, other.mode.frequency_hz),
+                damping: between(self.mode.damping, other.mode.damping),
+            },
+            ln_sd: LnDeviations {
+                frequency: (2.0 / (own + others)).sqrt(),
+                damping: between(self.ln_sd.damping, other.ln_sd.damping),
+            },
+        }
     }
 
     pub fn frequency_hz(&self) -> Interval {

@@ -68,10 +68,11 @@ pub(super) struct Driven {
     within_hz: Bounds,
 }
 
-/// Fourier coefficients of a motion whose mean power is 1.
+/// Fourier coefficients of a motion, of which what is no multiple of the known ones has a mean power
+/// of 1.
 struct Motion {
     coefficients: Vec<Complex<f64>>,
-    /// Its mean power, px²/Hz or rad²/Hz.
+    /// What they were divided by, in squares: px²/Hz or rad²/Hz.
     mean: f64,
 }
 
@@ -126,7 +127,8 @@ impl Driven {
         let known = coefficients.split_off(motions.len());
         let mut normed = Vec::with_capacity(motions.len());
         for mut coefficients in coefficients {
-            let mean = coefficients.iter().map(|c| c.norm_sqr()).sum::<f64>() / count as f64;
+            let left = left_by(&known, &coefficients, &vec![1.0; count]);
+            let mean = left.iter().sum::<f64>() / count as f64;
             if mean <= 0.0 || !mean.is_finite() {
                 return None;
             }
@@ -140,6 +142,11 @@ impl Driven {
             ancestors,
             within_hz,
         })
+    }
+
+    /// The power of a motion, by frequency, without the likeliest multiples of the known ones.
+    fn left(&self, expected: &[f64], motion: usize) -> Vec<f64> {
+        left_by(&self.known, &self.motions[motion].coefficients, expected)
     }
 
     /// The likeliest fit of up to `most` oscillators; `None` where `cancel` ends the work before.
@@ -271,7 +278,7 @@ impl Fit<'_> {
         let mut gains = vec![0.0; frequencies_hz.len()];
         for m in 0..self.likelihood.driven.motions.len() {
             let expected = self.likelihood.expected(&self.x, m);
-            let left = self.likelihood.left(&expected.powers, m);
+            let left = self.likelihood.driven.left(&expected.powers, m);
             let ratios: Vec<f64> = left
                 .iter()
                 .zip(&expected.powers)
@@ -286,6 +293,39 @@ impl Fit<'_> {
         peaks.truncate(MOST_PEAKS);
         peaks.iter().map(|k| frequencies_hz[*k]).collect()
     }
+}
+
+/// The power by frequency of what has some coefficients, without the multiples of `known` ones that
+/// are likeliest where the `expected` power is left.
+fn left_by(
+    known: &[Vec<Complex<f64>>],
+    coefficients: &[Complex<f64>],
+    expected: &[f64],
+) -> Vec<f64> {
+    let count = known.len();
+    let mut normal = DMatrix::<f64>::zeros(count, count);
+    let mut right = DVector::<f64>::zeros(count);
+    for (a, of_a) in known.iter().enumerate() {
+        for (k, expected) in expected.iter().enumerate() {
+            let weighted = of_a[k].conj() / *expected;
+            right[a] += (weighted * coefficients[k]).re;
+            for (b, of_b) in known.iter().enumerate().take(a + 1) {
+                normal[(a, b)] += (weighted * of_b[k]).re;
+            }
+        }
+    }
+    normal.fill_upper_triangle_with_lower_triangle();
+    let multiples = normal.cholesky().map(|c| c.solve(&right));
+    let multiples = multiples.unwrap_or_else(|| DVector::zeros(count));
+    let mut out = Vec::with_capacity(expected.len());
+    for (k, coefficient) in coefficients.iter().enumerate() {
+        let mut left = *coefficient;
+        for (of_known, multiple) in known.iter().zip(&multiples) {
+            left -= of_known[k] * *multiple;
+        }
+        out.push(left.norm_sqr());
+    }
+    out
 }
 
 fn is_peak(gains: &[f64], k: usize) -> bool {
@@ -444,36 +484,6 @@ impl Likelihood<'_> {
         out
     }
 
-    /// The power of a motion, by frequency, without the likeliest multiples of the known motions.
-    fn left(&self, expected: &[f64], motion: usize) -> Vec<f64> {
-        let coefficients = &self.driven.motions[motion].coefficients;
-        let known = &self.driven.known;
-        let count = known.len();
-        let mut normal = DMatrix::<f64>::zeros(count, count);
-        let mut right = DVector::<f64>::zeros(count);
-        for (a, of_a) in known.iter().enumerate() {
-            for (k, expected) in expected.iter().enumerate() {
-                let weighted = of_a[k].conj() / *expected;
-                right[a] += (weighted * coefficients[k]).re;
-                for (b, of_b) in known.iter().enumerate().take(a + 1) {
-                    normal[(a, b)] += (weighted * of_b[k]).re;
-                }
-            }
-        }
-        normal.fill_upper_triangle_with_lower_triangle();
-        let multiples = normal.cholesky().map(|c| c.solve(&right));
-        let multiples = multiples.unwrap_or_else(|| DVector::zeros(count));
-        let mut out = Vec::with_capacity(expected.len());
-        for (k, coefficient) in coefficients.iter().enumerate() {
-            let mut left = *coefficient;
-            for (of_known, multiple) in known.iter().zip(&multiples) {
-                left -= of_known[k] * *multiple;
-            }
-            out.push(left.norm_sqr());
-        }
-        out
-    }
-
     /// The value, and its first derivatives; those by the multiples of known motions are zero at
     /// their best.
     fn value_and_slopes(&self, x: &[f64]) -> (f64, DVector<f64>) {
@@ -500,7 +510,7 @@ impl Likelihood<'_> {
         let drift = x[rest.drift + motion].exp();
         let noise = x[rest.noise + motion].exp();
         let expected = self.expected(x, motion);
-        let left = self.left(&expected.powers, motion);
+        let left = self.driven.left(&expected.powers, motion);
         let mut cost = 0.0;
         for (k, frequency_hz) in self.driven.frequencies_hz.iter().enumerate() {
             let (power, gust) = (expected.powers[k], expected.gusts[k]);

@@ -6,8 +6,8 @@
 
 use super::branch_tree::BranchTree;
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
-    from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, MAX_CI_OF_TRUNK,
+    SearchLimits, from_the_trunk_up,
 };
 use super::decay::Mode;
 use super::film::Film;
@@ -17,6 +17,7 @@ use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
+use super::whole_decay::{Fundamental, fundamental};
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
@@ -60,7 +61,7 @@ const MIN_POINTS: usize = 4;
 /// like one.
 pub(super) const MIN_PERIODS: f64 = 3.0;
 /// Damping above which an oscillation is none that could be seen.
-const MAX_DAMPING: f64 = 0.2;
+pub(super) const MAX_DAMPING: f64 = 0.2;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.2;
 /// Noise is at most this share of what the ancestors leave.
@@ -73,7 +74,10 @@ const CI_INFLATION: f64 = 1.25;
 /// And the frequency's does not shrink below this standard deviation of its logarithm, however
 /// clear the decay is: most branches as they are found have some points of their neighbours. Found
 /// likewise.
-const MIN_LN_FREQUENCY_SD: f64 = 0.0015;
+const MIN_LN_SD: LnDeviations = LnDeviations {
+    frequency: 0.0015,
+    damping: 0.0,
+};
 
 /// The sway of every branch.
 pub(super) fn sways(
@@ -84,7 +88,13 @@ pub(super) fn sways(
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
+    let trunk = 1;
+    let with_points = tree.branches.get(trunk).zip(members.get(trunk));
+    let fundamental = with_points.and_then(|(trunk, tracks)| {
+        fundamental(film, tracks, trunk.base_px, onset, limits, cancel)
+    });
     let mut estimator = FreeDecay {
+        fundamental,
         tree,
         film,
         members,
@@ -109,6 +119,8 @@ struct ReleaseTime {
 }
 
 struct FreeDecay<'a> {
+    /// The trunk's sway, where all points at once show it.
+    fundamental: Option<Fundamental>,
     tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
@@ -125,6 +137,18 @@ struct FreeDecay<'a> {
 
 impl BranchEstimator for FreeDecay<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
+        let by_own_points = self.by_own_points(branch);
+        if branch.is_trunk() {
+            self.or_fundamental(branch, by_own_points)
+        } else {
+            by_own_points
+        }
+    }
+}
+
+impl FreeDecay<'_> {
+    /// The sway of a branch by its points and the modes of its carriers.
+    fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let points = Points::of(self.film, branch.tracks, self.onset.from);
         if points.tracks.len() < MIN_POINTS {
             return Err(Unidentified::NotMeasured);
@@ -141,9 +165,35 @@ impl BranchEstimator for FreeDecay<'_> {
         }
         found.sway
     }
-}
 
-impl FreeDecay<'_> {
+    /// The trunk's sway: by its own points, where all points at once agree with it or show none. Its
+    /// own points show it more exactly, but take modes close together for one; in all points these
+    /// differ in their shapes.
+    fn or_fundamental(&mut self, trunk: &BranchInFilm, by_own_points: Swaying) -> Swaying {
+        let Some(found) = self.fundamental else {
+            return by_own_points;
+        };
+        let mode = mode_of(found.mode.mode, &found.mode.ln_sd);
+        let own = self.own[trunk.node.index()];
+        let is_sure = mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci);
+        if own.is_some_and(|own| own.agrees_with(&mode))
+            || !is_sure
+            || self
+                .limits
+                .may_be_aliased(mode.mode.frequency_hz, self.film)
+        {
+            return by_own_points;
+        }
+        self.own[trunk.node.index()] = Some(mode);
+        self.trunk_is_known = true;
+        Ok(Sway {
+            frequency_hz: mode.frequency_hz(),
+            damping_ratio: mode.damping_ratio(),
+            excitation: Excitation::Release,
+            amplitude_deg: found.amplitude_deg,
+        })
+    }
+
     /// The mode that the branch has beyond its ancestors', and its sway if that can be told.
     fn estimate_from(
         &mut self,
@@ -170,13 +220,7 @@ impl FreeDecay<'_> {
         if fitted.has_no_ancestors() {
             self.learn_release(&fitted.fit, &spread);
         }
-        let mode = BranchMode {
-            mode,
-            ln_sd: LnDeviations {
-                frequency: (CI_INFLATION * ln_sd.frequency).hypot(MIN_LN_FREQUENCY_SD),
-                damping: CI_INFLATION * ln_sd.damping,
-            },
-        };
+        let mode = mode_of(mode, &ln_sd);
         if !mode.is_within(self.limits.max_relative_ci) {
             return Err(Unidentified::TooUncertain);
         }
@@ -368,6 +412,14 @@ impl FreeDecay<'_> {
                 sd_s: sd_s.min(self.release.sd_s),
             };
         }
+    }
+}
+
+/// A mode with the standard deviations that are believed.
+fn mode_of(mode: Mode, ln_sd: &LnDeviations) -> BranchMode {
+    BranchMode {
+        mode,
+        ln_sd: ln_sd.inflated(CI_INFLATION, &MIN_LN_SD),
     }
 }
 

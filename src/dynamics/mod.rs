@@ -33,6 +33,7 @@ mod swing;
 mod takes;
 mod tree_modes;
 mod turns;
+mod whole_decay;
 mod whole_tree;
 mod wind;
 

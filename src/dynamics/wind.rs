@@ -10,8 +10,8 @@ use super::ambient;
 use super::branch_tree::BranchTree;
 use super::branch_turns::turn_of;
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
-    from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, MAX_CI_OF_TRUNK,
+    SearchLimits, from_the_trunk_up,
 };
 use super::decay::Mode;
 use super::driven_modes::Spectrum;
@@ -44,10 +44,6 @@ const NOISE_PX: f64 = 0.15;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
 /// motion.
 const MIN_VARIANCE_OF_TRUNK: f64 = 0.1;
-/// A frequency that is nearer to an ancestor's than so many standard deviations is the ancestor's.
-/// After a release a share of the frequency bounds the same (free_decay.rs): there frequencies are
-/// known ten times as well, and what errs is the branches' points.
-const SAME_FREQ_SIGMAS: f64 = 2.0;
 /// An oscillator is one swing if its points move alike in time, each by a lever of its own, to a
 /// share of the squares ([`rank_one_fraction`]), and if such a share of them has it.
 const MIN_POINTS_SHARE: f64 = 0.75;
@@ -60,8 +56,6 @@ const CI_INFLATION: f64 = 1.1;
 /// A mode whose interval is so many times wider than is asked for is no answer, but serves to tell
 /// those of the branches on it.
 const MAX_CI_TO_SERVE: f64 = 2.0;
-/// The trunk's is an answer up to so many times.
-const MAX_CI_OF_TRUNK: f64 = 3.0;
 
 /// What is asked of an answer, by the points that it comes from. Found on made-up trees
 /// (tests/sway_trees.rs).
@@ -459,30 +453,6 @@ impl OwnMotion {
     }
 }
 
-impl BranchMode {
-    /// The mean of both where they agree, else itself. Both are of one film: their mean is no surer
-    /// than either.
-    fn agreed_with(&self, other: &Self) -> Self {
-        if !is_of_ancestor(self, std::slice::from_ref(other)) {
-            return *self;
-        }
-        let [own, others] =
-            [self, other].map(|m| m.ln_sd.frequency.max(f64::MIN_POSITIVE).powi(-2));
-        let share = own / (own + others);
-        let between = |own: f64, other: f64| own.powf(share) * other.powf(1.0 - share);
-        Self {
-            mode: Mode {
-                frequency_hz: between(self.mode.frequency_hz, other.mode.frequency_hz),
-                damping: between(self.mode.damping, other.mode.damping),
-            },
-            ln_sd: LnDeviations {
-                frequency: (2.0 / (own + others)).sqrt(),
-                damping: between(self.ln_sd.damping, other.ln_sd.damping),
-            },
-        }
-    }
-}
-
 /// Whether an oscillator that has these shares of the power moves the points as one swing. Real and
 /// imaginary parts of coefficients are as good as values in time (Parseval).
 fn check_one_swing(
@@ -539,10 +509,7 @@ fn own_oscillator(
 }
 
 fn is_of_ancestor(mode: &BranchMode, ancestors: &[BranchMode]) -> bool {
-    ancestors.iter().any(|a| {
-        let sd = a.ln_sd.frequency.hypot(mode.ln_sd.frequency);
-        a.mode.has_frequency_of(&mode.mode, SAME_FREQ_SIGMAS * sd)
-    })
+    ancestors.iter().any(|a| mode.agrees_with(a))
 }
 
 /// The largest first. Of the trunk the slowest of the larger ones: it carries all, and all else

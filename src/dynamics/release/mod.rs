@@ -164,22 +164,25 @@ fn of_one(
         frequencies_hz,
         cancel,
     };
-    if decay.times_s.len() < MIN_FRAMES || decay.points.tracks.is_empty() {
-        return wind;
-    }
-    let Some(left) = decay.left_by(Start::Moving, MODES) else {
-        return wind;
-    };
     let criteria = if motion.rested {
         FROM_REST
     } else {
         FROM_MOTION
     };
+    let dies_down = energy_ratio < criteria.max_energy_ratio;
+    if decay.times_s.len() < MIN_FRAMES
+        || decay.points.tracks.is_empty()
+        || given.is_none() && !dies_down
+    {
+        return wind;
+    }
+    let Some(left) = decay.left_by(Start::Moving, MODES) else {
+        return wind;
+    };
     let all = decay.points.squares();
     let noise = decay.points.noise().min(MAX_NOISE_SHARE * all);
-    let dies_down = energy_ratio < criteria.max_energy_ratio;
     let is_described = left - noise < criteria.max_left * (all - noise);
-    if given.is_none() && !(dies_down && is_described) {
+    if given.is_none() && !is_described {
         return wind;
     }
     Onset {

@@ -1,0 +1,305 @@
+//! The fundamental of a tree after a release, from all its points at once.
+//!
+//! The points' motions are compressed to their principal components, and damped cosines with common
+//! frequencies and damping ratios are fitted to these, one more at a time: modes as near to each
+//! other as a trunk's and a limb's differ in how large they are in each component. How many there
+//! are is not known: the fundamental is what most numbers of modes say (a stabilisation diagram, as
+//! of `subspace.rs`).
+
+use super::branches::{BranchMode, LnDeviations, SearchLimits};
+use super::decay::Mode;
+use super::film::Film;
+use super::free_decay::{MAX_DAMPING, MIN_PERIODS};
+use super::gap_free::enough_seen;
+use super::members::{Points, mean_px};
+use super::motions::{Motions, OF_SUBSPACE};
+use super::release::{Onset, RELEASE_SD_FRAMES};
+use super::sandwich::deviations;
+use super::signals::{Factor, Fit, Signals};
+use super::swing::Arms;
+use crate::bounds::Bounds;
+use crate::cancel::CancelToken;
+use crate::signal::statistics::quantile;
+use nalgebra::{DVector, Point2};
+
+/// Points that are used at most.
+const MOST_POINTS: usize = 120;
+/// Neighbouring frames are taken together to so many a second, and frequencies are looked for up to
+/// this share of them.
+const FRAMES_PER_S: f64 = 15.0;
+const MAX_FREQ_OF_RATE: f64 = 0.3;
+/// Frames that are needed.
+const MIN_FRAMES: usize = 32;
+/// Numbers of modes that are asked.
+const LEAST_MODES: usize = 3;
+const MOST_MODES: usize = 7;
+/// Energy of the fundamental at least, as a share of that of the mode that has most.
+const MIN_ENERGY: f64 = 0.1;
+/// From the median of distances to the standard deviation of a normal distribution.
+const SD_OF_MEDIAN: f64 = 1.4826;
+
+/// The slowest of the larger modes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fundamental {
+    pub mode: BranchMode,
+    /// Angle at its largest, as the points move about the place where the trunk begins, degrees.
+    pub amplitude_deg: f64,
+}
+
+/// Of `tracks`, which turn about `base_px`. `None` where there are too few points or frames, where
+/// fewer than half of the numbers of modes have any that a tree may have, and where `cancel` ends
+/// the work before.
+pub(super) fn fundamental(
+    film: &Film,
+    tracks: &[usize],
+    base_px: Point2<f64>,
+    onset: &Onset,
+    limits: &SearchLimits,
+    cancel: &CancelToken,
+) -> Option<Fundamental> {
+    let points = Points::up_to(MOST_POINTS, film, tracks, 0);
+    let every = (film.frames_per_period(FRAMES_PER_S) + 0.01).max(1.0);
+    let mut frames = film.neighbours(onset.from..film.times_s.len(), every as usize);
+    frames.retain(|of| enough_seen(&points, of));
+    if 2 * points.tracks.len() < OF_SUBSPACE || frames.len() < MIN_FRAMES {
+        return None;
+    }
+    let motions = Motions::of(film, &points, &frames);
+    let found = asked(&motions, film, onset, limits, cancel)?;
+    if 2 * found.len() <= MOST_MODES - LEAST_MODES {
+        return None;
+    }
+    let frequencies: Vec<f64> = found.iter().map(|f| f.mode.frequency_hz.ln()).collect();
+    let median = quantile(frequencies.clone(), 0.5)?;
+    let distance = |ln_frequency: &f64| (ln_frequency - median).abs();
+    let scatter = quantile(frequencies.iter().map(distance).collect(), 0.5)?;
+    let nearest = found.into_iter().min_by(|a, b| {
+        let [a, b] = [a, b].map(|f| distance(&f.mode.frequency_hz.ln()));
+        a.total_cmp(&b)
+    })?;
+    let places_px = points
+        .tracks
+        .iter()
+        .map(|&k| mean_px(&film.tracks[k].at_px[onset.from..]));
+    let arms = Arms::at(places_px, base_px);
+    let least = LnDeviations {
+        frequency: SD_OF_MEDIAN * scatter,
+        damping: 0.0,
+    };
+    Some(Fundamental {
+        mode: BranchMode {
+            mode: nearest.mode,
+            ln_sd: nearest.ln_sd.inflated(1.0, &least),
+        },
+        amplitude_deg: arms.amplitude_deg(&in_points(&motions, &nearest.factors), 0),
+    })
+}
+
+/// The fundamental by one number of modes.
+struct Found {
+    mode: Mode,
+    ln_sd: LnDeviations,
+    /// In each of the motions.
+    factors: Vec<Factor>,
+}
+
+/// The fundamental by each number of modes that has one.
+fn asked(
+    motions: &Motions,
+    film: &Film,
+    onset: &Onset,
+    limits: &SearchLimits,
+    cancel: &CancelToken,
+) -> Option<Vec<Found>> {
+    let highest_hz = limits
+        .frequencies_hz
+        .hi
+        .min(MAX_FREQ_OF_RATE / motions.step_s());
+    let signals = Signals::new(
+        motions.times_s.iter().map(|t| t - onset.at_s).collect(),
+        &motions.of_like_size(),
+        onset.start,
+        RELEASE_SD_FRAMES * film.step_s(),
+        Bounds::new(limits.frequencies_hz.lo, highest_hz),
+    );
+    let mut out = Vec::new();
+    let mut fit = Fit::default();
+    for modes in 1..=MOST_MODES {
+        if cancel.is_cancelled() {
+            return None;
+        }
+        let Some(new) = signals.search(&fit) else {
+            break;
+        };
+        fit.modes.push(new);
+        fit = signals.fit(&fit, &vec![None; modes]);
+        if modes >= LEAST_MODES {
+            out.extend(slowest(&signals, &fit));
+        }
+    }
+    Some(out)
+}
+
+/// The slowest of the larger modes of a fit that a tree may have.
+fn slowest(signals: &Signals, fit: &Fit) -> Option<Found> {
+    let spread = deviations(signals, fit, &vec![None; fit.modes.len()])?;
+    let factors = signals.factors(fit, OF_SUBSPACE);
+    let ends = signals.times_s.first().zip(signals.times_s.last());
+    let span_s = ends.map_or(0.0, |(first, last)| last - first);
+    let mut energies = Vec::with_capacity(fit.modes.len());
+    for (m, mode) in fit.modes.iter().enumerate() {
+        let may_be_tree_s = mode.damping < MAX_DAMPING
+            && mode.frequency_hz * span_s >= MIN_PERIODS
+            && !signals.at_limit(mode);
+        let squares: f64 = factors.iter().map(|f| f[m].size().powi(2)).sum();
+        // A decay lasts as long as its damping is small.
+        let energy = squares / (mode.damping * mode.frequency_hz);
+        energies.push(if may_be_tree_s { energy } else { 0.0 });
+    }
+    let least = MIN_ENERGY * energies.iter().copied().fold(0.0, f64::max);
+    let large = (0..energies.len()).filter(|m| energies[*m] > 0.0 && energies[*m] >= least);
+    let m = large.min_by(|a, b| {
+        let [a, b] = [a, b].map(|m| fit.modes[*m].frequency_hz);
+        a.total_cmp(&b)
+    })?;
+    Some(Found {
+        mode: fit.modes[m],
+        ln_sd: LnDeviations::of_parameters(&spread[2 * m..]),
+        factors: factors.iter().map(|f| f[m]).collect(),
+    })
+}
+
+/// The factors of a mode in u and v of each point, as [`Arms`] take them.
+fn in_points(motions: &Motions, factors: &[Factor]) -> Vec<Vec<Factor>> {
+    let scales: Vec<f64> = motions.scales().collect();
+    let [cosines, sines] = [|f: &Factor| f.cosine, |f: &Factor| f.sine].map(|part| {
+        let sizes = factors
+            .iter()
+            .zip(&scales)
+            .map(|(f, scale)| part(f) * scale);
+        motions.in_points(&DVector::from_iterator(
+            factors.len().min(scales.len()),
+            sizes,
+        ))
+    });
+    let mut out = Vec::with_capacity(2 * cosines.len());
+    for (cosine, sine) in cosines.iter().zip(&sines) {
+        for axis in 0..2 {
+            out.push(vec![Factor::of(&[cosine[axis], sine[axis]])]);
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::decay::Start;
+    use crate::dynamics::film::FilmTrack;
+    use crate::model::{Excitation, NodeId};
+    use crate::random::generator;
+    use rand::RngExt;
+    use std::f64::consts::TAU;
+
+    const FRAMES: u32 = 300;
+
+    /// Twelve points on a trunk, and as many on each of two limbs, px; of the limbs' modes each moves
+    /// its own points most, but the trunk's moves all.
+    fn film(sizes_px: [f64; 3]) -> Film {
+        let mut random = generator(5, 0);
+        let times_s: Vec<f64> = (0..FRAMES).map(|k| f64::from(k) / 30.0).collect();
+        let mut tracks = Vec::new();
+        for point in 0..36 {
+            let height = f64::from(point % 12) / 12.0;
+            let shape = [
+                height,
+                f64::from(point / 12 == 1),
+                f64::from(point / 12 == 2),
+            ];
+            let mut at_px = Vec::new();
+            for t in &times_s {
+                let mut at = Point2::new(100.0 + f64::from(point), 200.0 - 100.0 * height);
+                for ((mode, shape), size) in MODES.iter().zip(shape).zip(sizes_px) {
+                    let phase = TAU * mode.frequency_hz * t;
+                    let decay = (-mode.damping * phase).exp();
+                    at.x += size * shape * decay * phase.cos();
+                    at.y += 0.3 * size * shape * decay * phase.cos();
+                }
+                at.x += 0.2 * random.random_range(-1.0..1.0);
+                at.y += 0.2 * random.random_range(-1.0..1.0);
+                at_px.push(at);
+            }
+            let node = NodeId(1);
+            tracks.push(FilmTrack { node, at_px });
+        }
+        Film::new(&times_s, tracks)
+    }
+
+    /// All within a bin of ten seconds.
+    const MODES: [Mode; 3] = [
+        Mode {
+            frequency_hz: 0.50,
+            damping: 0.035,
+        },
+        Mode {
+            frequency_hz: 0.57,
+            damping: 0.05,
+        },
+        Mode {
+            frequency_hz: 0.59,
+            damping: 0.05,
+        },
+    ];
+
+    fn found(film: &Film, cancel: &CancelToken) -> Option<Fundamental> {
+        let onset = Onset {
+            excitation: Excitation::Release,
+            start: Start::Moving,
+            at_s: 0.0,
+            from: 0,
+            to: film.times_s.len(),
+        };
+        let limits = SearchLimits {
+            frequencies_hz: Bounds::new(0.15, 13.0),
+            highest_hz: 10.0,
+            max_relative_ci: 0.05,
+        };
+        let tracks: Vec<usize> = (0..film.tracks.len()).collect();
+        fundamental(
+            film,
+            &tracks,
+            Point2::new(118.0, 200.0),
+            &onset,
+            &limits,
+            cancel,
+        )
+    }
+
+    #[test]
+    fn modes_within_one_bin_do_not_move_the_fundamental() {
+        let found = found(&film([6.0, 8.0, 8.0]), &CancelToken::new()).expect("a fundamental");
+        let off = (found.mode.mode.frequency_hz / 0.5).ln().abs();
+        assert!(off < 0.004, "off by {off}");
+        assert!(
+            off < 3.0 * found.mode.ln_sd.frequency.max(0.0015),
+            "{found:?}"
+        );
+        // 6 px at 100 px.
+        assert!((found.amplitude_deg - 3.4).abs() < 0.7, "{found:?}");
+    }
+
+    #[test]
+    fn what_says_nothing_has_none() {
+        let still = found(&film([0.0; 3]), &CancelToken::new());
+        let is_sure = still.is_some_and(|f| f.mode.is_within(0.05));
+        assert!(!is_sure, "noise has none: {still:?}");
+        let film = film([6.0, 8.0, 8.0]);
+        let cancel = CancelToken::new();
+        cancel.cancel();
+        assert!(found(&film, &cancel).is_none());
+        let short = film.part(0..40);
+        assert!(found(&short, &CancelToken::new()).is_none());
+        let few = Film::new(&film.times_s, film.tracks[..2].to_vec());
+        assert!(found(&few, &CancelToken::new()).is_none());
+    }
+}
