@@ -12,7 +12,7 @@ use super::branches::{
 use super::decay::Mode;
 use super::film::Film;
 use super::fit::Prior;
-use super::members::{Points, mean_px};
+use super::members::{Points, mean_px, trunk};
 use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
@@ -85,6 +85,7 @@ pub(super) fn sways(
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut estimator = FreeDecay {
+        trunk: trunk(tree, members),
         tree,
         film,
         members,
@@ -109,6 +110,7 @@ struct ReleaseTime {
 }
 
 struct FreeDecay<'a> {
+    trunk: NodeId,
     tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
@@ -131,10 +133,11 @@ impl BranchEstimator for FreeDecay<'_> {
         }
         let found = self.estimate_from(branch, &points)?;
         // All points have the trunk's sway: where it is not known, a branch would be given it.
-        if !branch.is_trunk() && !self.trunk_is_known {
+        let is_trunk = branch.node == self.trunk;
+        if !is_trunk && !self.trunk_is_known {
             return Err(Unidentified::AncestorsSway);
         }
-        self.trunk_is_known |= branch.is_trunk();
+        self.trunk_is_known |= is_trunk;
         match found.sway {
             Ok(_) => self.own[branch.node.index()] = Some(found.mode),
             Err(_) => self.mixed[branch.node.index()] = Some(found.mode.mode),
