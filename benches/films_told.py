@@ -41,6 +41,7 @@ FILM_FILES = ["video.mkv", "outline.json", "truth.json", "grid.npz"]
 @dataclass
 class Told:
     branches: int = 0
+    answers_hz: list = field(default_factory=list)
     right: list = field(default_factory=list)
     in_interval: list = field(default_factory=list)
     hz_errors: list = field(default_factory=list)
@@ -134,6 +135,7 @@ def compare(film, capture):
             continue
         meant = [film.branches[b] for b in film.carriers(branch_of(film, branches))]
         errors = {b["id"]: relative_error(answer["frequency_hz"], b["freq_hz"]) for b in meant}
+        told.answers_hz.append(float(answer["frequency_hz"]))
         told.right.append(any(e <= RIGHT_WITHIN for e in errors.values()))
         if meant and answer["frequency_lo_hz"] and answer["frequency_hi_hz"]:
             truth_hz = film.branches[min(errors, key=errors.get)]["freq_hz"]

@@ -38,6 +38,11 @@ def variable_rate(video, out):
     copy(video, out, f"noise=drop='{DROPPED}'")
 
 
+def half_rate(video, out):
+    """Every second frame is left out, and the file says so."""
+    join([mjpeg("-i", video, "-bsf:v", r"noise=drop='mod(n\,2)'")], out, FPS / 2)
+
+
 def joined(video, other, out):
     """The film goes on as another one."""
     join([mjpeg("-i", video, "-t", f"{JOINED_S}"), mjpeg("-ss", f"{JOINED_S}", "-i", other)], out)
@@ -63,9 +68,9 @@ def mjpeg(*arguments):
     return ffmpeg(*arguments, "-c", "copy", "-f", "mjpeg", "-")
 
 
-def join(parts, out):
+def join(parts, out, rate_hz=FPS):
     """Pictures at even times."""
-    ffmpeg("-f", "mjpeg", "-framerate", f"{FPS}", "-i", "-", "-c", "copy", out, given=b"".join(parts))
+    ffmpeg("-f", "mjpeg", "-framerate", f"{rate_hz}", "-i", "-", "-c", "copy", out, given=b"".join(parts))
 
 
 def ffmpeg(*arguments, given=None):

@@ -150,10 +150,6 @@ pub(super) struct BranchInFilm<'a> {
 }
 
 impl BranchInFilm<'_> {
-    pub fn is_trunk(&self) -> bool {
-        self.node == NodeId(1)
-    }
-
     pub fn is_on_foot(&self) -> bool {
         self.parent == NodeId(0)
     }

@@ -12,7 +12,7 @@ use super::branches::{
 use super::decay::Mode;
 use super::film::Film;
 use super::fit::Prior;
-use super::members::{Points, mean_px};
+use super::members::{Points, mean_px, trunk};
 use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
@@ -88,13 +88,17 @@ pub(super) fn sways(
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
-    let trunk = 1;
-    let with_points = tree.branches.get(trunk).zip(members.get(trunk));
+    let trunk = trunk(tree, members);
+    let with_points = tree
+        .branches
+        .get(trunk.index())
+        .zip(members.get(trunk.index()));
     let fundamental = with_points.and_then(|(trunk, tracks)| {
         fundamental(film, tracks, trunk.base_px, onset, limits, cancel)
     });
     let mut estimator = FreeDecay {
         fundamental,
+        trunk,
         tree,
         film,
         members,
@@ -119,6 +123,7 @@ struct ReleaseTime {
 }
 
 struct FreeDecay<'a> {
+    trunk: NodeId,
     /// The trunk's sway, where all points at once show it.
     fundamental: Option<Fundamental>,
     tree: &'a BranchTree,
@@ -138,7 +143,7 @@ struct FreeDecay<'a> {
 impl BranchEstimator for FreeDecay<'_> {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying {
         let by_own_points = self.by_own_points(branch);
-        if branch.is_trunk() {
+        if branch.node == self.trunk {
             self.or_fundamental(branch, by_own_points)
         } else {
             by_own_points
@@ -155,10 +160,11 @@ impl FreeDecay<'_> {
         }
         let found = self.estimate_from(branch, &points)?;
         // All points have the trunk's sway: where it is not known, a branch would be given it.
-        if !branch.is_trunk() && !self.trunk_is_known {
+        let is_trunk = branch.node == self.trunk;
+        if !is_trunk && !self.trunk_is_known {
             return Err(Unidentified::AncestorsSway);
         }
-        self.trunk_is_known |= branch.is_trunk();
+        self.trunk_is_known |= is_trunk;
         match found.sway {
             Ok(_) => self.own[branch.node.index()] = Some(found.mode),
             Err(_) => self.mixed[branch.node.index()] = Some(found.mode.mode),

@@ -2,6 +2,7 @@
 
 use super::branch_tree::BranchTree;
 use super::film::Film;
+use crate::model::NodeId;
 use crate::signal::statistics::{noise_variance, rms};
 use nalgebra::Point2;
 
@@ -34,6 +35,14 @@ pub(super) fn members(tree: &BranchTree, film: &Film) -> Vec<Vec<usize>> {
         }
     }
     out
+}
+
+/// The branch on the foot that most points are on or above.
+pub(super) fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
+    let branches = (1..members.len() as u32).map(NodeId);
+    let on_foot = branches.filter(|b| tree.branches[b.index()].parent == Some(NodeId(0)));
+    let largest = on_foot.max_by_key(|b| (members[b.index()].len(), std::cmp::Reverse(*b)));
+    largest.unwrap_or(NodeId(1))
 }
 
 impl Points {

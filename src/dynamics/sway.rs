@@ -4,7 +4,7 @@ use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, SearchLimits};
 use super::film::Film;
 use super::free_decay;
-use super::members::members;
+use super::members::{members, trunk};
 use super::modal;
 use super::point_modes::{PointModes, Shoot, is_open, may_have_other};
 use super::release::{Onset, onset};
@@ -162,9 +162,15 @@ impl<'a> UsableFilm<'a> {
         let (film, limits) = (&self.film, &self.limits);
         match self.onset.excitation {
             Excitation::Wind => tree_modes::point_modes(tree, film, &self.members, limits, cancel),
-            Excitation::Release => {
-                modal::point_modes(tree, film, &self.onset, limits, sways, cancel)
-            }
+            Excitation::Release => modal::point_modes(
+                tree,
+                film,
+                &self.members,
+                &self.onset,
+                limits,
+                sways,
+                cancel,
+            ),
         }
     }
 
@@ -189,7 +195,8 @@ impl<'a> UsableFilm<'a> {
             Excited::Wind => Some(Excitation::Wind),
         };
         let members = members(tree, film);
-        let of_tree: &[usize] = members.get(1).map_or(&[], Vec::as_slice);
+        let trunk = trunk(tree, &members).index();
+        let of_tree: &[usize] = members.get(trunk).map_or(&[], Vec::as_slice);
         let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz, cancel);
         if cancel.is_cancelled() {
             return Err(Unidentified::NotInTime);

@@ -18,7 +18,7 @@ use super::driven_modes::Spectrum;
 use super::driven_oscillators::{Driven, Oscillator, about_highest_hz};
 use super::film::Film;
 use super::gap_free::GapFree;
-use super::members::{Points, mean_px};
+use super::members::{Points, mean_px, trunk};
 use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
 use crate::cancel::CancelToken;
@@ -115,14 +115,6 @@ pub(super) fn sways(
     };
     estimator.fundamental = estimator.whole_tree();
     from_the_trunk_up(tree, members, cancel, &mut estimator)
-}
-
-/// The branch on the foot that most points are on or above.
-pub(super) fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
-    let branches = (1..members.len() as u32).map(NodeId);
-    let on_foot = branches.filter(|b| tree.branches[b.index()].parent == Some(NodeId(0)));
-    let largest = on_foot.max_by_key(|b| (members[b.index()].len(), std::cmp::Reverse(*b)));
-    largest.unwrap_or(NodeId(1))
 }
 
 /// What the analysis of a branch leaves for those on it.

@@ -19,6 +19,7 @@ use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
+use super::members::trunk;
 use super::point_modes::{PointMode, PointModes, mode_of};
 use super::release::Onset;
 use crate::bounds::Bounds;
@@ -51,17 +52,20 @@ const MIN_LN_SD: LnDeviations = LnDeviations {
 };
 
 /// The modes of all points at once, from the captured tree with the answers of `sways`; `None` where
-/// too little is seen, or `cancel` ends it before.
+/// too little is seen, or `cancel` ends it before. `members` are the points of every branch and of
+/// all that it carries.
 pub(super) fn point_modes(
     tree: &BranchTree,
     film: &Film,
+    members: &[Vec<usize>],
     onset: &Onset,
     limits: &SearchLimits,
     sways: &[Swaying],
     cancel: &CancelToken,
 ) -> Option<PointModes> {
     // All points have the trunk's sway: without it nothing is sure.
-    if !sways.get(1).is_some_and(Result::is_ok) {
+    let trunk = trunk(tree, members).index();
+    if !sways.get(trunk).is_some_and(Result::is_ok) {
         return None;
     }
     let thinned = ThinnedFilm::of(film, onset);
@@ -274,6 +278,23 @@ mod tests {
         );
     }
 
+    /// A branch on the foot that is listed before the trunk, and has no points, hides nothing.
+    #[test]
+    fn the_trunk_is_the_branch_of_most_points_whatever_its_place() {
+        let (mut skeleton, mut film) = filmed(&[(1.10, &[4.0, 5.0, 3.5, 4.5, 5.5, 5.0])]);
+        for known in &mut skeleton.nodes[1..] {
+            known.parent = known.parent.map(|p| NodeId(p.0 + u32::from(p.0 > 0)));
+        }
+        let empty = Node::made_up(1, Some(0), [40.0, 10.0, 0.0]);
+        skeleton.nodes.insert(1, Node { level: 1, ..empty });
+        for track in &mut film.tracks {
+            track.node = NodeId(track.node.0 + 1);
+        }
+        let sway = analysed(&skeleton, &film);
+        assert!(sway[2].unwrap().frequency_hz.holds(0.6), "{sway:?}");
+        assert!(sway[3].unwrap().frequency_hz.holds(1.10), "{sway:?}");
+    }
+
     /// The points of the branches that are found beside the trunk and the tip as a whole.
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
         let cancel = CancelToken::new();
@@ -289,7 +310,8 @@ mod tests {
             return Vec::new();
         };
         let sways = free_decay::sways(&tree, &film, &members, &onset, &limits, &cancel);
-        let Some(found) = point_modes(&tree, &film, &onset, &limits, &sways, &cancel) else {
+        let Some(found) = point_modes(&tree, &film, &members, &onset, &limits, &sways, &cancel)
+        else {
             return Vec::new();
         };
         let own = found.modes.iter().map(|mode| mode.tracks.clone());
