@@ -7,7 +7,7 @@
 demo: setup build
 	@scripts/demo.sh
 
-# ONLY=views, film, shapes, wind, points, terminal, page or sheets for one group. CLIPS is ARBORCAM_CLIPS if not given.
+# ONLY=views, film, shapes, wind, grown, points, terminal, page or sheets for one group. CLIPS is ARBORCAM_CLIPS if not given.
 pictures: build
 	@CLIPS="$(CLIPS)" ONLY="$(ONLY)" scripts/pictures.sh
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
+# wind, grown, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
 # without CLIPS the second is of a film made anew, for which PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
@@ -125,6 +125,29 @@ shapes() {
     row "$to/topiary.png" "$work"/shaped-{triangle,circle,pentagon,heart,vase}.png
 }
 
+# A tree and new ones like it: of the same forks, and of the same branches at freer and freer angles.
+grown() {
+    local threshold tree
+    capture winter
+    "$arborcam" grow "$work/winter" --count 4 --motion none --out "$work/offspring" 2>"$work/grow.log" ||
+        fail "grow failed: $(tail -n 1 "$work/grow.log")"
+    for threshold in 0.6 0.4 0.2; do
+        "$arborcam" grow "$work/winter" --count 1 --motion none --like von-mises --threshold "$threshold" \
+            --out "$work/turned-$threshold" 2>"$work/grow.log" || fail "grow failed: $(tail -n 1 "$work/grow.log")"
+    done
+    for tree in winter offspring/tree-000{1,2,3,4} turned-{0.6,0.4,0.2}/tree-0001; do
+        render_made "$tree"
+    done
+    row "$to/grown.png" "$work"/made-winter.png "$work"/made-offspring-tree-000{1,2,3,4}.png
+    row "$to/turned.png" "$work"/made-winter.png "$work"/made-turned-{0.6,0.4,0.2}-tree-0001.png
+}
+
+# Draws the tree in a folder below $work to made-NAME.png, slashes as dashes.
+render_made() {
+    "$arborcam" render "$work/$1" --bare --size 256x288 --out "$work/made-${1//\//-}.png" 2>"$work/render.log" ||
+        fail "render of $1 failed: $(cat "$work/render.log")"
+}
+
 # Still air, a breeze, a gale and a storm.
 wind() {
     local tree force out
@@ -225,6 +248,7 @@ wanted views && views
 wanted film && film_beside
 wanted shapes && shapes
 wanted wind && wind
+wanted grown && grown
 wanted points && points
 wanted terminal && terminal
 wanted page && page

@@ -26,7 +26,7 @@
 //! · `track` points followed · [`hierarchy`] which points move together · `wood` which pixels are
 //! wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
 //! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
-//! motion that was not filmed ·
+//! motion that was not filmed · [`grow`] new trees like an example ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
 //! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
@@ -63,6 +63,7 @@ pub mod export;
 mod ffmpeg;
 pub mod files;
 pub mod geometry;
+pub mod grow;
 pub mod hierarchy;
 pub mod model;
 pub mod motion;

@@ -16,6 +16,7 @@ mod dress;
 mod film_log;
 #[cfg(feature = "opencv")]
 mod front;
+mod grown;
 mod leaves;
 mod pose_tracker;
 mod refiner;
@@ -34,6 +35,7 @@ pub use dress::{dress, flutter};
 pub use film_log::{FilmLog, KeptFrame};
 #[cfg(feature = "opencv")]
 pub use front::FrontEnd;
+pub use grown::stand_grown;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, reshape};

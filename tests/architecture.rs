@@ -39,6 +39,11 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("signal", &[]),
     ("random", &[]),
     ("animate", &["model", "config", "signal", "random"]),
+    // New trees are flat before they are stood up in space.
+    (
+        "grow",
+        &["model", "config", "signal", "skeleton::Node2d", "random"],
+    ),
     // Sub-branches, which only their own frequency tells, and modes.
     (
         "solve",
@@ -120,7 +125,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "views",
         &[
             "model", "config", "files", "document", "export", "pipeline", "shape", "geometry",
-            "draw", "signal",
+            "draw", "signal", "grow", "animate", "random",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it; its table for statistics is
@@ -194,6 +199,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "views",
             "animate",
             "draw",
+            "grow",
             "report",
             "solve::Model",
             "solve::LEAST_MOVING",

@@ -492,7 +492,7 @@ const CASES: &[Case] = &[
     (
         "replay {f}/clip.mkv --envelope sphere",
         BAD_USAGE,
-        &["sphere", "give revolution, hull, or an image"],
+        &["sphere", "give revolution, hull, or a file"],
         Nothing,
     ),
     (

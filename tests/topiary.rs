@@ -333,7 +333,7 @@ fn shapes_that_are_none_are_refused_by_name() {
     let of = |rgba: &[u8]| Drawn::of_rgba(size, rgba);
     assert_eq!(
         of(&on_picture(size, |_, _| true)),
-        Err(TopiaryError::NoAlpha)
+        Err(TopiaryError::NoShape)
     );
     assert_eq!(
         of(&on_picture(size, |_, _| false)),

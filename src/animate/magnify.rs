@@ -3,9 +3,9 @@
 
 use super::soft;
 use crate::bounds::Bounds;
-use crate::model::{JointPose, MovingBranch, Pose, Skeleton};
+use crate::model::{MovingBranch, Pose, Skeleton};
 use crate::signal::reflection::there_and_back;
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use realfft::RealFftPlanner;
 
 /// Share of a band's ends over which it fades.
@@ -120,7 +120,7 @@ pub fn magnify(
         } else {
             film.at(there_and_back(film_s, length_s))
         };
-        out.push(posed(skeleton, &branches, &turns, k, k as f64 / fps));
+        out.push(skeleton.posed(&branches, &turns, k, k as f64 / fps));
     }
     Ok(out)
 }
@@ -156,20 +156,10 @@ impl TurnedFilm {
     }
 }
 
-/// How a branch had turned against the one that carries it, as an axis times an angle, in every
-/// pose.
+/// How a branch had turned against the one that carries it in every pose, see
+/// [`MovingBranch::own_turn`].
 fn own_turns(poses: &[&Pose], branch: &MovingBranch) -> Vec<Vector3<f64>> {
-    let mut turns = Vec::with_capacity(poses.len());
-    for pose in poses {
-        let [turned, carried] = [branch.node, branch.parent].map(|n| pose.joints[n.index()]);
-        let own = (carried.rotation.inverse() * turned.rotation).scaled_axis();
-        turns.push(if own.iter().all(|x| x.is_finite()) {
-            own
-        } else {
-            Vector3::zeros()
-        });
-    }
-    turns
+    poses.iter().map(|pose| branch.own_turn(pose)).collect()
 }
 
 /// The same with its changes about the mean, or the part of them in the band, magnified and
@@ -278,33 +268,5 @@ impl Moment {
 
     fn value(&self, of: &[Vector3<f64>]) -> Vector3<f64> {
         of[self.before] * (1.0 - self.share) + of[self.before + 1] * self.share
-    }
-}
-
-/// The tree with its `branches` turned so: each turns about its base, and keeps its length.
-fn posed(
-    skeleton: &Skeleton,
-    branches: &[MovingBranch],
-    turns: &[Vector3<f64>],
-    frame: u64,
-    time_s: f64,
-) -> Pose {
-    let mut joints: Vec<JointPose> = Vec::with_capacity(skeleton.nodes.len());
-    for node in &skeleton.nodes {
-        joints.push(JointPose {
-            position: node.position,
-            rotation: UnitQuaternion::identity(),
-        });
-    }
-    for (branch, turn) in branches.iter().zip(turns) {
-        let own = UnitQuaternion::from_scaled_axis(*turn);
-        let carried = joints[branch.parent.index()].rotation;
-        let rotation = UnitQuaternion::new_normalize((carried * own).into_inner());
-        branch.place(skeleton, rotation, &mut joints);
-    }
-    Pose {
-        frame,
-        time_s,
-        joints,
     }
 }

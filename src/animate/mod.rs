@@ -27,7 +27,7 @@ pub use oscillator::{Oscillation, Transition};
 pub use pull::place_to_pull;
 pub use sound::{Loudness, SoundError};
 pub use tune::{Tuning, tune};
-pub use wind::{Air, Wind, speed_m_s};
+pub use wind::{Air, Wind, speed_m_s, wind_scale};
 
 /// By how much an angle is to be multiplied so that it never exceeds `most` (same unit): not at all
 /// up to `knee`, beyond it more and more.

@@ -3,6 +3,7 @@
 use super::noise::Noise;
 use super::sound::Loudness;
 use crate::config;
+use crate::model::Skeleton;
 use crate::random::seed_of_part;
 use nalgebra::{Point3, Vector3};
 
@@ -27,6 +28,16 @@ const CHANGE_S: f64 = 1.0;
 /// Mean speed of a force on the Beaufort scale, m/s: 0.836 B^(3/2).
 pub fn speed_m_s(force: f64) -> f64 {
     0.836 * force.max(0.0).powf(1.5)
+}
+
+/// Metres of a pixel for the wind about a tree: `given`, or where that is 0 as many as a tree of
+/// the height in the settings has.
+pub fn wind_scale(skeleton: &Skeleton, given: f64, settings: &config::Wind) -> f64 {
+    if given > 0.0 {
+        return given;
+    }
+    let heights_px = skeleton.nodes.iter().map(|n| n.position.y);
+    settings.tree_height_m / heights_px.fold(1.0, f64::max)
 }
 
 /// What drives the gusts.

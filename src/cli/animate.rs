@@ -12,12 +12,14 @@ use super::render::{self, write_error};
 use super::session::stop_on_signals;
 use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
-use crate::animate::{Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull};
+use crate::animate::{
+    Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull, wind_scale,
+};
 use crate::document::{DocumentError, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html};
 use crate::files::{refuse_taken, write_files};
-use crate::model::{NodeId, Pose, Swaying};
+use crate::model::{NodeId, Pose};
 use crate::tui;
 use crate::views::{PreparedTree, Shot};
 use anyhow::{Context, anyhow};
@@ -144,11 +146,13 @@ fn magnify_options(args: &AnimateArgs, tree: &PreparedTree, factor: f64) -> Magn
 /// A simulation of the tree at rest, in wind with the period `period_s`.
 fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Animator {
     let settings = &tree.config.wind;
-    let mut wind = Wind::new(settings, period_s, metres_per_px(tree));
+    let given = tree.config.export.metres_per_px;
+    let scale = wind_scale(&tree.skeleton, given, settings);
+    let mut wind = Wind::new(settings, period_s, scale);
     if let Some(sound) = sound {
         wind = wind.driven_by(sound);
     }
-    let measured: Vec<Known> = tree.sway.iter().map(measured).collect();
+    let measured: Vec<Known> = tree.sway.iter().map(Known::of).collect();
     let animator = Animator::new(tree.skeleton.clone(), &measured, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         eprint_line(&format!(
@@ -260,33 +264,6 @@ fn pull_aside(
         ));
     }
     Ok(())
-}
-
-/// The measured frequency and damping of a branch.
-fn measured(sway: &Swaying) -> Known {
-    sway.as_ref().map_or_else(
-        |_| Known::default(),
-        |s| Known {
-            frequency_hz: Some(s.frequency_hz.value),
-            damping_ratio: s.damping_ratio.map(|d| d.value),
-        },
-    )
-}
-
-/// The scale of the capture; if it has none, that of a tree of the height `wind.tree_height_m`.
-fn metres_per_px(tree: &PreparedTree) -> f64 {
-    let given = tree.config.export.metres_per_px;
-    let height_px = tree
-        .skeleton
-        .nodes
-        .iter()
-        .map(|n| n.position.y)
-        .fold(1.0, f64::max);
-    if given > 0.0 {
-        given
-    } else {
-        tree.config.wind.tree_height_m / height_px
-    }
 }
 
 /// Writes the animation to `out`, and prints a line about it.

@@ -4,6 +4,7 @@ use crate::config::ConfigError;
 use crate::document::DocumentError;
 use crate::export::ExportError;
 use crate::files::WriteError;
+use crate::grow::GrowError;
 use crate::recording::RecordingError;
 use crate::runtime::Failure;
 use crate::views::PrepareError;
@@ -81,7 +82,8 @@ impl From<PrepareError> for CommandError {
             PrepareError::Document(e) => e.into(),
             PrepareError::Export(e) => e.into(),
             PrepareError::Shape(e) => Self::bad_usage(e),
-            PrepareError::NoPose { .. } => Self::bad_usage(e),
+            PrepareError::NoPose { .. } | PrepareError::NotDense { .. } => Self::bad_usage(e),
+            PrepareError::Grow(GrowError::NoSpace | GrowError::OffTree) => Self::bad_usage(e),
             e => Self::failed(e),
         }
     }

@@ -10,6 +10,7 @@ mod devices;
 mod doctor;
 mod export;
 mod finish;
+mod grow;
 mod hangup;
 mod line;
 mod note;
@@ -63,6 +64,8 @@ enum Command {
     /// Animate the tree of a capture in simulated wind, pull and release it, or magnify its filmed
     /// motion.
     Animate(animate::AnimateArgs),
+    /// Grow new trees that look and move like the tree of a capture.
+    Grow(grow::GrowArgs),
     /// Note species, site, wind and the like on a capture, or print what is noted on it.
     Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
@@ -95,6 +98,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Export(args) => export::run(args),
         Command::Analyze(args) => analyze::run(args),
         Command::Animate(args) => animate::run(args),
+        Command::Grow(args) => grow::run(args),
         Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),

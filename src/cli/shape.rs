@@ -4,8 +4,11 @@ use super::command_error::CommandError;
 use super::line::Line;
 use crate::config::{Config, EnvelopeKind, Leader};
 use crate::model::Size;
-use anyhow::anyhow;
+use crate::outline::{PolygonFile, from_polygon};
+use crate::shape::Drawn;
+use anyhow::{Context, anyhow};
 use clap::Args;
+use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 
 /// Shape options of `capture`, `replay` and the commands that read a capture.
@@ -16,9 +19,10 @@ pub struct ShapeArgs {
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
     /// Envelope of the branches: the outline rotated about its axis (`revolution`), the rotated
-    /// hull of the visible branches (`hull`), or, for `export` and `render`, an image to whose
-    /// opaque part the tree is cut.
-    #[arg(long, value_name = "revolution|hull|IMAGE", value_parser = Envelope::parse)]
+    /// hull of the visible branches (`hull`), or, for `export` and `render`, a shape that the tree
+    /// is cut to: the opaque part of an image, the white part of a mask, a photograph of a thing
+    /// before a plain background, or a polygon (JSON).
+    #[arg(long, value_name = "revolution|hull|FILE", value_parser = Envelope::parse)]
     envelope: Option<Envelope>,
 }
 
@@ -111,9 +115,25 @@ impl Envelope {
             "hull" => Ok(Self::Kind(EnvelopeKind::Hull)),
             // A word that is no existing file is more likely a misspelt keyword.
             path if Path::new(path).is_file() => Ok(Self::Image(path.into())),
-            _ => Err("give revolution, hull, or an image that is there".into()),
+            _ => Err("give revolution, hull, or a file that is there".into()),
         }
     }
+}
+
+/// The shape in a file: an image, or a polygon in JSON.
+///
+/// # Errors
+/// It cannot be read, or has no shape in it.
+pub fn read_drawn(path: &Path) -> anyhow::Result<Drawn> {
+    let bytes = std::fs::read(path).context("cannot read it")?;
+    if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
+        return Ok(Drawn::of_image(&bytes)?);
+    }
+    let polygon: PolygonFile = serde_json::from_slice(&bytes)
+        .context("is no polygon: it must hold width, height and polygon_px")?;
+    let corners_px: Vec<Point2<f64>> = polygon.polygon_px.into_iter().map(Point2::from).collect();
+    let size = Size::new(polygon.width, polygon.height);
+    Ok(Drawn::of_region(&from_polygon(&corners_px, size)?)?)
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::command_error::CommandError;
 use super::output::eprint_line;
 use super::scale::ScaleArgs;
-use super::shape::ShapeArgs;
+use super::shape::{ShapeArgs, read_drawn};
 use super::unused;
 use crate::config::{Config, LeafShow};
 use crate::document::Document;
@@ -12,7 +12,6 @@ use crate::model::{Luma, Size};
 use crate::outline;
 use crate::shape::{Cut, Drawn};
 use crate::views::{PrepareError, PreparedTree, TreeOptions};
-use anyhow::Context;
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 
@@ -158,13 +157,9 @@ impl TreeArgs {
         let Some(path) = self.shape.image() else {
             return Ok(None);
         };
-        let drawn = std::fs::read(path)
-            .context("cannot read it")
-            .and_then(|bytes| Ok(Drawn::of_image(&bytes)?));
-        match drawn {
-            Ok(drawn) => Ok(Some(drawn)),
-            Err(e) => Err(envelope_error(path, e)),
-        }
+        read_drawn(path)
+            .map(Some)
+            .map_err(|e| envelope_error(path, e))
     }
 
     /// The image of the density of the leaves.

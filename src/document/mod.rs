@@ -30,7 +30,7 @@ pub use bark::BARK_FILE;
 pub use camera::{CAMERA_FILE, CAMERA_HEADER, CameraCsv};
 pub use error::DocumentError;
 pub use modes::{MODES_FILE, modes};
-pub use motion::{MOTION_HEADER, MotionCsv};
+pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};
 pub use note::{CaptureNote, SCHEMA_VERSION};
 pub use number::push as push_number;

@@ -12,7 +12,7 @@ use std::io::{Read, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-pub(super) const FILE: &str = "motion.csv";
+pub const FILE: &str = "motion.csv";
 pub const MOTION_HEADER: &str = "frame,time_s,node_id,x,y,z,u_px,v_px";
 
 const COLUMNS: [&str; 6] = ["frame", "time_s", "node_id", "x", "y", "z"];

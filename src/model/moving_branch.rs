@@ -3,7 +3,7 @@
 //! A traced bend, or a side branch on which no point is followed, has no motion of its own: it is a
 //! part of the branch that ends in its mover ([`Node::moves_with`](super::Node::moves_with)).
 
-use super::{JointPose, NodeId, Skeleton};
+use super::{JointPose, NodeId, Pose, Skeleton};
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A branch that moves on its own.
@@ -28,6 +28,18 @@ impl MovingBranch {
     /// Its end and the nodes that move with it.
     pub fn parts(&self) -> impl Iterator<Item = NodeId> {
         std::iter::once(self.node).chain(self.riders.iter().copied())
+    }
+
+    /// How it has turned in a pose of its tree against the branch that carries it, as an axis
+    /// (model axes at rest) times an angle, radians; 0 where the pose holds no number.
+    pub fn own_turn(&self, pose: &Pose) -> Vector3<f64> {
+        let [turned, carried] = [self.node, self.parent].map(|n| pose.joints[n.index()]);
+        let own = (carried.rotation.inverse() * turned.rotation).scaled_axis();
+        if own.iter().all(|x| x.is_finite()) {
+            own
+        } else {
+            Vector3::zeros()
+        }
     }
 
     /// Turns the branch about the place in `joints` where it begins, with all that moves with it.
@@ -81,6 +93,36 @@ impl Skeleton {
             }
         }
         out
+    }
+
+    /// The tree with its `branches` turned as [`MovingBranch::own_turn`] says: each turns about its
+    /// base, and keeps its length. `branches` are all of them, in the order of
+    /// [`moving_branches`](Self::moving_branches), and `turns` one for each.
+    pub fn posed(
+        &self,
+        branches: &[MovingBranch],
+        turns: &[Vector3<f64>],
+        frame: u64,
+        time_s: f64,
+    ) -> Pose {
+        let mut joints: Vec<JointPose> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            joints.push(JointPose {
+                position: node.position,
+                rotation: UnitQuaternion::identity(),
+            });
+        }
+        for (branch, turn) in branches.iter().zip(turns) {
+            let own = UnitQuaternion::from_scaled_axis(*turn);
+            let carried = joints[branch.parent.index()].rotation;
+            let rotation = UnitQuaternion::new_normalize((carried * own).into_inner());
+            branch.place(self, rotation, &mut joints);
+        }
+        Pose {
+            frame,
+            time_s,
+            joints,
+        }
     }
 
     /// The branch that ends in `node`, without the nodes that move with it.

@@ -82,3 +82,14 @@ pub fn parse(text: &str, name: String, size: Size) -> Result<Outline, OutlineErr
         other => other,
     })
 }
+
+/// The largest piece of a region, its holes filled, with its border as a polygon.
+///
+/// # Errors
+/// The region is empty.
+pub fn in_one_piece(region: &Outline) -> Result<Outline, OutlineError> {
+    let found = region::close_to_one(region.size, &region.mask, 0);
+    found
+        .map_err(OutlineError::bad_polygon)?
+        .ok_or_else(|| OutlineError::bad_polygon("it is empty"))
+}

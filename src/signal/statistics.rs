@@ -38,6 +38,29 @@ pub fn quantile(values: Vec<f64>, share: f64) -> Option<f64> {
     nth_smallest(values, (share * last as f64) as usize)
 }
 
+/// The value up to which one of the parts reaches that a histogram is parted into so that both vary
+/// least (Otsu 1979); 0 where all values are the same.
+pub fn otsu(histogram: &[u32; 256]) -> u8 {
+    let count: f64 = histogram.iter().map(|&n| f64::from(n)).sum();
+    let sum: f64 = (0..256).map(|v| v as f64 * f64::from(histogram[v])).sum();
+    let (mut below, mut sum_below) = (0.0, 0.0);
+    let (mut best, mut threshold) = (0.0, 0);
+    for (value, &n) in (0..=u8::MAX).zip(histogram) {
+        below += f64::from(n);
+        sum_below += f64::from(value) * f64::from(n);
+        let above = count - below;
+        if below <= 0.0 || above <= 0.0 {
+            continue;
+        }
+        let apart = sum_below / below - (sum - sum_below) / above;
+        let between = below * above * apart * apart;
+        if between > best {
+            (best, threshold) = (between, value);
+        }
+    }
+    threshold
+}
+
 /// Root of the mean square; 0 of none.
 pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut count) = (0.0, 0_u32);

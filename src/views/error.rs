@@ -3,6 +3,7 @@
 use crate::document::DocumentError;
 use crate::export::ExportError;
 use crate::files::WriteError;
+use crate::grow::GrowError;
 use crate::pipeline::MOST_RESHAPED;
 use crate::shape::TopiaryError;
 use std::path::PathBuf;
@@ -25,6 +26,18 @@ pub enum PrepareError {
     NothingToDraw,
     #[error("there is no pose at {at_s} s: the film is {last_s:.1} s long; give less with --at")]
     NoPose { at_s: f64, last_s: f64 },
+    /// No new tree can be grown from an example.
+    #[error(transparent)]
+    Grow(#[from] GrowError),
+    #[error(
+        "no angle between branches has a density of {threshold} per rad: the highest is {highest:.3}; give less \
+         --threshold"
+    )]
+    NotDense { threshold: f64, highest: f64 },
+    #[error(
+        "the film of {} shows no motion that could be learned; give --motion wind or none", .dir.display()
+    )]
+    NoSway { dir: PathBuf },
     /// The drawn shape is none for this tree.
     #[error(transparent)]
     Shape(#[from] TopiaryError),

@@ -4,12 +4,16 @@
 
 mod error;
 mod loops;
+mod offspring;
 mod prepared;
 mod studio;
 mod tables;
 mod write;
 
 pub use error::PrepareError;
+pub use offspring::{
+    Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
+};
 pub use prepared::{PreparedTree, TreeOptions};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;

@@ -1,6 +1,7 @@
 //! A document's tree as it is wanted: of another shape, cut, in leaf, moved otherwise.
 
 use super::loops::looped_flutter;
+use super::offspring::outline_of;
 use super::{PrepareError, SwayFound};
 use crate::config::Config;
 use crate::document::note::Software;
@@ -381,13 +382,4 @@ fn sway_of_cut(sway: &[Swaying], topiary: &Topiary) -> Vec<Swaying> {
         });
     }
     all
-}
-
-fn outline_of(document: &Document) -> Result<&Outline, PrepareError> {
-    let at_rest = document.outline_at_rest.as_ref();
-    at_rest
-        .or(document.outline.as_ref())
-        .ok_or_else(|| PrepareError::NoOutline {
-            dir: document.dir.clone(),
-        })
 }

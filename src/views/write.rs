@@ -3,7 +3,9 @@
 
 use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::{CaptureNote, json};
-use crate::document::{BARK_FILE, Document, MODES_FILE, PICTURE_FILE, at_rest_files, jpeg, png};
+use crate::document::{
+    BARK_FILE, Document, MODES_FILE, MOTION_FILE, MotionCsv, PICTURE_FILE, at_rest_files, jpeg, png,
+};
 use crate::export::gltf::glb;
 use crate::files::{OutputFolder, WriteError, replace, write_files};
 use crate::model::{
@@ -130,7 +132,8 @@ impl DocumentWriter {
     }
 }
 
-/// Writes a document without tables of a film to `dir`, which appears when it is complete.
+/// Writes a document of a tree that was not filmed to `dir`, which appears when it is complete. If
+/// it moves all the same, its poses are all of its motion.
 ///
 /// # Errors
 /// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
@@ -142,8 +145,24 @@ pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<Path
         modes: &[],
         cut: None,
     };
+    write_motion(&folder, &draft)?;
     DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
     Ok(folder.publish()?)
+}
+
+/// Writes the poses of a tree that was not filmed, if there are any.
+fn write_motion(folder: &OutputFolder, draft: &Draft) -> Result<(), PrepareError> {
+    if draft.poses.is_empty() {
+        return Ok(());
+    }
+    let skeleton = Arc::new(draft.skeleton.clone());
+    let metres_per_px = draft.note.model.as_ref().map_or(0.0, |m| m.metres_per_px);
+    let mut motion = MotionCsv::new(folder.file(MOTION_FILE)?, &skeleton, metres_per_px)?;
+    for pose in &draft.poses {
+        motion.pose(pose)?;
+    }
+    motion.finish()?;
+    Ok(())
 }
 
 /// Puts other answers on the sway into the document in `dir`: into `nodes.csv` and `modes.csv`,

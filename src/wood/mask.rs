@@ -8,6 +8,7 @@ use super::mixture::{Mixtures, Seed};
 use super::{Stroke, blurred, colour_mat};
 use crate::cancel::CancelToken;
 use crate::model::{Foot, Rgb, Size, bounds_px};
+use crate::signal::statistics::otsu;
 use nalgebra::{Matrix3, Point2, Vector3};
 use opencv::core::{CV_8U, CV_32S, Mat, Point, Rect, Scalar, Size as CvSize, Vec3b, Vector};
 use opencv::imgproc::{
@@ -667,7 +668,7 @@ impl Ridges {
         Ok(Self {
             height,
             mean: mean(&histogram),
-            threshold: otsu(&histogram),
+            threshold: f64::from(otsu(&histogram)),
         })
     }
 
@@ -694,28 +695,6 @@ fn mean(histogram: &[u32; 256]) -> f64 {
     let count: f64 = histogram.iter().map(|&n| f64::from(n)).sum();
     let sum: f64 = (0..256).map(|v| v as f64 * f64::from(histogram[v])).sum();
     sum / count.max(1.0)
-}
-
-/// The value that parts a histogram in two so that both parts vary least (Otsu 1979).
-fn otsu(histogram: &[u32; 256]) -> f64 {
-    let count: f64 = histogram.iter().map(|&n| f64::from(n)).sum();
-    let sum = mean(histogram) * count;
-    let (mut below, mut sum_below) = (0.0, 0.0);
-    let (mut best, mut threshold) = (0.0, 0.0);
-    for (value, &n) in histogram.iter().enumerate() {
-        below += f64::from(n);
-        sum_below += value as f64 * f64::from(n);
-        let above = count - below;
-        if below <= 0.0 || above <= 0.0 {
-            continue;
-        }
-        let apart = sum_below / below - (sum - sum_below) / above;
-        let between = below * above * apart * apart;
-        if between > best {
-            (best, threshold) = (between, value as f64);
-        }
-    }
-    threshold
 }
 
 /// The pixels of `low` whose colours are found there much more often than beside it, and are not
@@ -793,7 +772,7 @@ impl Leaves {
         let evened = blurred(rest, 1.0)?;
         let pixels = evened.data_typed::<Vec3b>()?;
         let green: Vec<u8> = pixels.iter().map(greenness).collect();
-        let least = otsu(&histogram(&green, moves)).max(GREEN);
+        let least = f64::from(otsu(&histogram(&green, moves))).max(GREEN);
         let is_leaf: Vec<bool> = green.iter().map(|g| f64::from(*g) > least).collect();
         let n_moving = moves.iter().filter(|moves| **moves).count();
         let n_leaf = is_leaf

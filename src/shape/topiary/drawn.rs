@@ -1,31 +1,36 @@
 //! A drawn shape, and where it stands in the picture.
 
-use crate::model::{Outline, Size};
+use crate::model::{Outline, Size, bounds_px};
+use crate::signal::statistics::otsu;
 use nalgebra::Point2;
 
 /// Alpha from which on a pixel is inside.
 const INSIDE: u8 = 128;
+/// A picture is a mask if this share of it is as good as black or white.
+const MASK: f64 = 0.98;
+const BLACK: u8 = 16;
+const WHITE: u8 = 239;
 
 /// Why a drawn shape is not taken.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TopiaryError {
     #[error(
-        "has no transparent pixel, so that the shape fills the whole picture; save it on a transparent background"
+        "has no shape in it: all its pixels are alike, or the shape fills the whole picture; draw it in white on black"
     )]
-    NoAlpha,
+    NoShape,
     #[error("is empty: every pixel is transparent; draw the shape opaque")]
     Empty,
     #[error(
         "lies off the tree: the trunk does not reach it; draw it over the tree, or in another size than the picture's"
     )]
     OffTree,
-    #[error("is no image that can be read ({0}); give a PNG with a transparent background")]
+    #[error("is no image that can be read ({0}); give a PNG")]
     NoImage(String),
     #[error("is not whole: {found} bytes where a {size} picture has four a pixel")]
     NotWhole { found: usize, size: Size },
 }
 
-/// A shape as it was drawn: the opaque pixels of an image.
+/// A shape as it was drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Drawn {
     size: Size,
@@ -35,10 +40,10 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// The shape in the bytes of an image file, PNG for choice.
+    /// The shape in the bytes of an image file, see [`of_rgba`](Self::of_rgba).
     ///
     /// # Errors
-    /// It is no image, has no transparent pixel, or only such.
+    /// It is no image, or has no shape in it.
     pub fn of_image(bytes: &[u8]) -> Result<Self, TopiaryError> {
         let image = image::load_from_memory(bytes)
             .map_err(|e| TopiaryError::NoImage(e.to_string()))?
@@ -46,10 +51,13 @@ impl Drawn {
         Self::of_rgba(Size::new(image.width(), image.height()), image.as_raw())
     }
 
-    /// The shape in an image of four bytes a pixel, of which the last is alpha.
+    /// The shape in an image of four bytes a pixel, of which the last is alpha: its opaque part.
+    /// Without a transparent pixel it is a mask, whose white part is the shape (Zeng 2015 fig. 6.4),
+    /// or a photograph of a thing before a plain background (Li 2011 fig. 11), in which what is
+    /// darker or brighter than the background is the shape.
     ///
     /// # Errors
-    /// It has no transparent pixel, or only such.
+    /// All pixels are transparent, or there is no shape in it.
     pub fn of_rgba(size: Size, rgba: &[u8]) -> Result<Self, TopiaryError> {
         if rgba.is_empty()
             || rgba.len() as u64 != 4 * u64::from(size.width) * u64::from(size.height)
@@ -59,19 +67,25 @@ impl Drawn {
                 size,
             });
         }
-        let inside: Vec<bool> = rgba.chunks_exact(4).map(|p| p[3] >= INSIDE).collect();
-        if rgba.chunks_exact(4).all(|p| p[3] == u8::MAX) {
-            return Err(TopiaryError::NoAlpha);
-        }
+        let inside: Vec<bool> = if rgba.chunks_exact(4).all(|p| p[3] == u8::MAX) {
+            of_brightness(size, rgba).ok_or(TopiaryError::NoShape)?
+        } else {
+            rgba.chunks_exact(4).map(|p| p[3] >= INSIDE).collect()
+        };
+        Self::of_inside(size, inside)
+    }
+
+    /// The shape of a region in a picture.
+    ///
+    /// # Errors
+    /// Nothing is inside.
+    pub fn of_region(region: &Outline) -> Result<Self, TopiaryError> {
+        Self::of_inside(region.size, region.mask.iter().map(|m| *m != 0).collect())
+    }
+
+    fn of_inside(size: Size, inside: Vec<bool>) -> Result<Self, TopiaryError> {
         let mask: Vec<u8> = inside.iter().map(|i| u8::from(*i) * 255).collect();
-        let bounds = Outline {
-            size,
-            mask,
-            polygon_px: Vec::new(),
-            matte: None,
-        }
-        .bounds_px()
-        .ok_or(TopiaryError::Empty)?;
+        let bounds = bounds_px(&mask, size).ok_or(TopiaryError::Empty)?;
         Ok(Self {
             size,
             inside,
@@ -131,5 +145,73 @@ impl Drawn {
             }
         }
         mask
+    }
+}
+
+/// Which pixels of an opaque picture are the shape; `None` where all are alike.
+fn of_brightness(size: Size, rgba: &[u8]) -> Option<Vec<bool>> {
+    let luma: Vec<u8> = rgba.chunks_exact(4).map(brightness).collect();
+    let mut counts = [0_u32; 256];
+    for l in &luma {
+        counts[usize::from(*l)] += 1;
+    }
+    if counts.iter().filter(|n| **n > 0).count() < 2 {
+        return None;
+    }
+    let threshold = otsu(&counts);
+    let bright: Vec<bool> = luma.iter().map(|l| *l > threshold).collect();
+    let extreme = luma.iter().filter(|l| **l <= BLACK || **l >= WHITE).count();
+    let is_mask = extreme as f64 >= MASK * luma.len() as f64;
+    let is_inverted = !is_mask && 2 * bright_on_border(size, &bright) > border_length(size);
+    Some(bright.iter().map(|b| *b != is_inverted).collect())
+}
+
+/// ITU-R BT.601.
+fn brightness(pixel: &[u8]) -> u8 {
+    let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(u32::from);
+    ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8
+}
+
+/// Number of pixels on the border of a picture, those in a corner counted twice.
+fn border_length(size: Size) -> u64 {
+    2 * (u64::from(size.width) + u64::from(size.height))
+}
+
+/// How many of them are bright.
+fn bright_on_border(size: Size, bright: &[bool]) -> u64 {
+    let (w, h) = (size.width as usize, size.height as usize);
+    let rows = (0..w).flat_map(|u| [u, (h - 1) * w + u]);
+    let columns = (0..h).flat_map(|v| [v * w, v * w + w - 1]);
+    rows.chain(columns).filter(|k| bright[*k]).count() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A disc of one grey before another.
+    fn disc(within: u8, around: u8) -> Vec<u8> {
+        let mut rgba = Vec::new();
+        for v in 0..40 {
+            for u in 0..60 {
+                let is_in = (f64::from(u) - 30.0).hypot(f64::from(v) - 20.0) <= 12.0;
+                // Some noise, as in a photograph.
+                let grey = if is_in { within } else { around }.saturating_add((u % 3) as u8);
+                rgba.extend([grey, grey, grey, 255]);
+            }
+        }
+        rgba
+    }
+
+    #[test]
+    fn masks_and_photographs_give_the_shape() {
+        for (within, around) in [(250, 0), (60, 180), (200, 90)] {
+            let drawn = Drawn::of_rgba(Size::new(60, 40), &disc(within, around)).expect("shape");
+            assert!(drawn.contains(30, 20) && !drawn.contains(2, 2));
+            assert_eq!(drawn.bounds, [18, 8, 42, 32]);
+        }
+        // White is inside, however much of the border it has.
+        let drawn = Drawn::of_rgba(Size::new(60, 40), &disc(0, 250)).expect("shape");
+        assert!(!drawn.contains(30, 20) && drawn.contains(2, 2));
     }
 }

@@ -1,0 +1,168 @@
+//! `arborcam grow EXAMPLE --count N --out DIR`: new trees like the tree of a capture.
+
+use super::command_error::CommandError;
+use super::common::parse_within;
+use super::output::eprint_line;
+use super::shape::read_drawn;
+use super::stop::Stop;
+use crate::document::Document;
+use crate::files::refuse_taken;
+use crate::grow::Resampling;
+use crate::model::Outline;
+use crate::outline;
+use crate::views::{Likeness, OffspringMotion, OffspringOptions, Parent, example_outline};
+use anyhow::{Context, anyhow};
+use clap::{Args, ValueEnum};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
+
+/// Most trees of one run.
+const MOST_TREES: u64 = 100_000;
+
+#[derive(Debug, Args)]
+pub struct GrowArgs {
+    /// The example: the folder written by `capture` or `replay --out`, or by `grow`.
+    example: PathBuf,
+    /// Number of new trees.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_TREES))]
+    count: u64,
+    /// Seed of the random numbers; the same seed gives the same trees.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// In what the trees are like the example.
+    #[arg(long, value_name = "WHAT", default_value = "dirichlet")]
+    like: Like,
+    /// Only angles with a density above this are taken, 1/rad; less is freer (von-mises).
+    #[arg(long, value_name = "DENSITY", value_parser = threshold)]
+    threshold: Option<f64>,
+    /// Branches from this level on are turned; the trunk has level 1 (von-mises).
+    #[arg(long, value_name = "LEVEL", value_parser = clap::value_parser!(u8).range(1..))]
+    from_level: Option<u8>,
+    /// The shape that the trees fill instead of the example's outline: a picture with a transparent
+    /// background, a mask (white = inside) or a photograph of a thing before a plain background, or
+    /// a polygon (JSON) (dirichlet).
+    #[arg(long, value_name = "IMAGE|MASK|POLYGON")]
+    envelope: Option<PathBuf>,
+    /// How the trees move; by default as the example, or not at all where that does not.
+    #[arg(long, value_name = "HOW")]
+    motion: Option<HowToMove>,
+    /// Settings that differ from those of the example (TOML; see config/arborcam.toml).
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Folder for the trees, one folder for each. It must not exist.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Like {
+    /// Forks of the same kind, in a new order (Li 2011).
+    Dirichlet,
+    /// The same branches at other angles (Zeng 2015).
+    VonMises,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum HowToMove {
+    /// With the example's frequencies, in a loop of ten seconds.
+    Example,
+    /// In the wind of the settings, in a loop of ten seconds.
+    Wind,
+    /// Not at all.
+    None,
+}
+
+/// Parses `--threshold`, 1/rad.
+fn threshold(text: &str) -> Result<f64, String> {
+    parse_within(text, 0.0..=1e3, "give a density from 0 to 1000")
+}
+
+pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
+    let likeness = args.likeness()?;
+    refuse_taken(&args.out)?;
+    let stop = Stop::on_signals()?;
+    let note = Document::note(&args.example)?;
+    let config = note.config.layered(args.config.as_deref(), |_| {})?;
+    let document = Document::read(&args.example, config.export.animation_s)?;
+    let motion = args.motion(&document);
+    let region = args.region(&document)?;
+    let options = OffspringOptions {
+        likeness,
+        motion,
+        region,
+        config,
+    };
+    let parent = Parent::new(document, options)?;
+    let is_stopped = stop.while_writing();
+    for number in 1..=args.count {
+        if is_stopped.load(Ordering::SeqCst) {
+            return Err(CommandError::Stopped);
+        }
+        let tree = parent.offspring(args.seed, number)?;
+        parent.write(&args.out.join(format!("tree-{number:04}")), tree)?;
+    }
+    let trees = if args.count == 1 { "tree" } else { "trees" };
+    eprint_line(&format!("{}: {} {trees}", args.out.display(), args.count));
+    Ok(())
+}
+
+impl GrowArgs {
+    /// # Errors
+    /// An option does not go with what is asked for.
+    fn likeness(&self) -> Result<Likeness, CommandError> {
+        let unfit = match self.like {
+            Like::Dirichlet if self.threshold.is_some() => "--threshold goes with --like von-mises",
+            Like::Dirichlet if self.from_level.is_some() => {
+                "--from-level goes with --like von-mises"
+            }
+            Like::VonMises if self.envelope.is_some() => {
+                "--envelope goes with --like dirichlet: von-mises keeps the example's branches"
+            }
+            Like::Dirichlet => return Ok(Likeness::Forks),
+            Like::VonMises => {
+                let default = Resampling::default();
+                return Ok(Likeness::Branches(Resampling {
+                    threshold: self.threshold.unwrap_or(default.threshold),
+                    from_level: self.from_level.unwrap_or(default.from_level),
+                }));
+            }
+        };
+        Err(CommandError::BadUsage(anyhow!(unfit)))
+    }
+
+    /// What is asked for; else as the example where that moves.
+    fn motion(&self, document: &Document) -> OffspringMotion {
+        match self.motion {
+            Some(HowToMove::Example) => OffspringMotion::Example,
+            Some(HowToMove::Wind) => OffspringMotion::Wind,
+            Some(HowToMove::None) => OffspringMotion::AtRest,
+            None if document.has_motion() => OffspringMotion::Example,
+            None => {
+                eprint_line(
+                    "arborcam: note: the example has no motion, and the trees stand still; give \
+                     --motion wind",
+                );
+                OffspringMotion::AtRest
+            }
+        }
+    }
+
+    /// The region of `--envelope` in the picture of the example.
+    fn region(&self, document: &Document) -> Result<Option<Outline>, CommandError> {
+        let Some(path) = &self.envelope else {
+            return Ok(None);
+        };
+        let own = example_outline(document)?;
+        let region = placed(path, own, document);
+        region
+            .map(Some)
+            .with_context(|| format!("--envelope {}", path.display()))
+            .map_err(CommandError::BadUsage)
+    }
+}
+
+/// The shape in a file where it stands in the picture of the example.
+fn placed(path: &Path, own: &Outline, document: &Document) -> anyhow::Result<Outline> {
+    let placed = read_drawn(path)?.placed(own, document.skeleton.foot_px)?;
+    Ok(outline::in_one_piece(&placed)?)
+}

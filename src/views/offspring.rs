@@ -1,0 +1,323 @@
+//! New trees like the tree of a document, each a document of its own.
+
+use super::{Draft, PrepareError, PreparedTree, TreeOptions, write_document};
+use crate::animate::{Animator, Known, Wind, wind_scale};
+use crate::config::{self, Config, EnvelopeKind, Leader, LeafShow};
+use crate::document::note::{BarkNote, CaptureNote, ModelNote, OutlineNote, Quality, Source};
+use crate::document::{BARK_FILE, Document};
+use crate::grow::{
+    ForkStatistics, LOOP_S, MotionStatistics, Resampling, SideAngles, grow_flat, resample,
+    sample_sway,
+};
+use crate::model::{Outline, Pose, Skeleton, Swaying, Timing, Unidentified};
+use crate::pipeline::{MOST_RESHAPED, reshape, stand_grown};
+use crate::random::{Generator, generator, seed_of_part};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Poses of a loop in wind, Hz.
+const WIND_RATE_HZ: f64 = 30.0;
+
+/// In what new trees are like the example.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Likeness {
+    /// They have forks of the same kind (Li 2011 sect. 5).
+    Forks,
+    /// They have the same branches at other angles (Zeng 2015 sect. 5.4.2).
+    Branches(Resampling),
+}
+
+/// How new trees move.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OffspringMotion {
+    /// As the example did in its film.
+    Example,
+    /// In the wind of the settings.
+    Wind,
+    AtRest,
+}
+
+/// What new trees are to be like.
+#[derive(Clone, Debug)]
+pub struct OffspringOptions {
+    pub likeness: Likeness,
+    pub motion: OffspringMotion,
+    /// What they are to fill, in the picture of the example; `None`: its own outline.
+    pub region: Option<Outline>,
+    /// The example's settings, or others.
+    pub config: Config,
+}
+
+/// An example, and all that was learned of it.
+pub struct Parent {
+    document: Document,
+    form: Form,
+    motion: Motion,
+    region: Outline,
+    /// How much larger than the example new trees are.
+    scale: f64,
+    config: Config,
+}
+
+/// What was learned of its form.
+enum Form {
+    Forks(ForkStatistics),
+    Branches { angles: SideAngles, how: Resampling },
+}
+
+/// What was learned of its motion.
+enum Motion {
+    Example(Box<MotionStatistics>),
+    Wind,
+    AtRest,
+}
+
+/// A new tree.
+#[derive(Clone, Debug)]
+pub struct Offspring {
+    pub skeleton: Skeleton,
+    /// A loop, the last pose the first again; none at rest.
+    pub poses: Vec<Pose>,
+    /// How each node sways: as a branch of the example does.
+    pub sway: Vec<Swaying>,
+    /// The settings that it was made with, its own seeds among them.
+    pub config: Config,
+}
+
+impl Parent {
+    /// Learns from the tree and the motion of `document`, which was read with as much of its film
+    /// as is to be learned from.
+    ///
+    /// # Errors
+    /// It has too few forks, no outline, or no motion where it is to move like it; the region is
+    /// empty; the tree is too large to be given another shape.
+    pub fn new(document: Document, options: OffspringOptions) -> Result<Self, PrepareError> {
+        let mut config = options.config;
+        let nodes = document.skeleton.measured() * config.shape.planes as usize;
+        if nodes > MOST_RESHAPED {
+            return Err(PrepareError::TooManyNodes { nodes });
+        }
+        let own = outline_of(&document)?.clone();
+        let region = options.region.unwrap_or_else(|| own.clone());
+        let form = match options.likeness {
+            Likeness::Forks => Form::Forks(ForkStatistics::of(&document.skeleton)?),
+            Likeness::Branches(how) => Form::Branches {
+                angles: SideAngles::of(&document.skeleton),
+                how,
+            },
+        };
+        for_new_trees(&mut config.shape, &options.likeness);
+        let motion = match options.motion {
+            OffspringMotion::Example => {
+                let learned = MotionStatistics::of(&document.skeleton, &document.poses);
+                Motion::Example(Box::new(learned.ok_or_else(|| PrepareError::NoSway {
+                    dir: document.dir.clone(),
+                })?))
+            }
+            OffspringMotion::Wind => Motion::Wind,
+            OffspringMotion::AtRest => Motion::AtRest,
+        };
+        let scale = height_px(&region) / height_px(&own).max(1.0);
+        let (document, in_leaf) = looked_at(document)?;
+        if config.leaves.show == LeafShow::Auto {
+            // No picture shows theirs.
+            config.leaves.show = if in_leaf { LeafShow::On } else { LeafShow::Off };
+        }
+        Ok(Self {
+            document,
+            form,
+            motion,
+            region,
+            scale,
+            config,
+        })
+    }
+
+    /// The new tree with this number. The same seed and number give the same tree, whatever others
+    /// are made.
+    ///
+    /// # Errors
+    /// The region lies off the trunk, or no angle is dense enough.
+    pub fn offspring(&self, seed: u64, number: u64) -> Result<Offspring, PrepareError> {
+        let seed = seed_of_part(seed, number);
+        let mut config = self.config.clone();
+        config.wood.seed = seed_of_part(seed, 3) as u32;
+        config.wind.seed = seed_of_part(seed, 4) as u32;
+        let skeleton = self.skeleton(&config, &mut generator(seed, 0))?;
+        let sway = self.sway(&skeleton, &mut generator(seed, 1));
+        let poses = match &self.motion {
+            Motion::AtRest => Vec::new(),
+            Motion::Wind => in_wind(&skeleton, &sway, &config),
+            Motion::Example(learned) => {
+                let most_rad = config.wind.max_bend_deg.to_radians();
+                learned.sample(&skeleton, most_rad, &mut generator(seed, 2))
+            }
+        };
+        Ok(Offspring {
+            skeleton,
+            poses,
+            sway,
+            config,
+        })
+    }
+
+    fn skeleton(&self, config: &Config, random: &mut Generator) -> Result<Skeleton, PrepareError> {
+        let example = &self.document.skeleton;
+        match &self.form {
+            Form::Forks(statistics) => {
+                let foot_px = example.foot_px;
+                let flat = grow_flat(statistics, &self.region, foot_px, self.scale, random)?;
+                let trunk_px = example.nodes.get(1).map_or(1.0, |top| top.radius);
+                let trunk_px = trunk_px * self.scale;
+                Ok(stand_grown(&flat, &self.region, trunk_px, config))
+            }
+            Form::Branches { angles, how } => {
+                let turned = resample(example, angles, how, random).map_err(|nothing| {
+                    PrepareError::NotDense {
+                        threshold: how.threshold,
+                        highest: nothing.highest,
+                    }
+                })?;
+                Ok(reshape(&turned, &self.region, config))
+            }
+        }
+    }
+
+    fn sway(&self, new: &Skeleton, random: &mut Generator) -> Vec<Swaying> {
+        let (example, known) = (&self.document.skeleton, &self.document.sway);
+        match &self.form {
+            Form::Forks(_) => sample_sway(example, known, new, random),
+            Form::Branches { .. } => {
+                // The same branches, and copies that nothing was measured on.
+                let mut sway = known.clone();
+                sway.truncate(example.measured());
+                sway.resize(new.nodes.len(), Err(Unidentified::NotMeasured));
+                sway
+            }
+        }
+    }
+
+    /// Writes a new tree as a document to `dir`, which appears when it is complete.
+    ///
+    /// # Errors
+    /// `dir` is there already, or a file cannot be written.
+    pub fn write(&self, dir: &Path, tree: Offspring) -> Result<PathBuf, PrepareError> {
+        let bark = self.document.bark.as_ref();
+        let draft = Draft {
+            note: self.note(&tree),
+            skeleton: &tree.skeleton,
+            picture: None,
+            bark,
+            at_rest: None,
+            poses: tree.poses,
+            pose_in_picture: None,
+        };
+        write_document(dir, draft, &tree.sway)
+    }
+
+    fn note(&self, tree: &Offspring) -> CaptureNote {
+        let own = &self.document.note;
+        let polygon_px: Vec<[i32; 2]> = self.region.polygon_px.iter().map(|p| [p.x, p.y]).collect();
+        let outline = (!polygon_px.is_empty()).then(|| OutlineNote {
+            frame: 0,
+            width: self.region.size.width,
+            height: self.region.size.height,
+            rest_polygon_px: polygon_px.clone(),
+            polygon_px,
+        });
+        let bark = self.document.bark.as_ref().map(|_| BarkNote {
+            file: BARK_FILE.into(),
+        });
+        CaptureNote {
+            captured_at: None,
+            source: Source {
+                name: format!("grown from {}", own.source.name),
+                format_asked: String::new(),
+                format_given: String::new(),
+                ..own.source
+            },
+            timing: Timing::default(),
+            config: tree.config.clone(),
+            outline,
+            picture: None,
+            bark,
+            masks: None,
+            build: None,
+            refinement: None,
+            quality: Quality::default(),
+            verdict: None,
+            judged_by: None,
+            model: Some(ModelNote::of(&tree.skeleton, self.document.metres_per_px())),
+            animation: None,
+            warnings: Vec::new(),
+            ..own.clone()
+        }
+    }
+}
+
+/// The settings of the shape for new trees.
+fn for_new_trees(shape: &mut config::Shape, likeness: &Likeness) {
+    match likeness {
+        // A line along the example's trunk is none along theirs.
+        Likeness::Forks if shape.leader == Leader::Drawn => shape.leader = Leader::Auto,
+        Likeness::Forks => {}
+        // Branches that were turned out of the outline keep their length.
+        Likeness::Branches(_) => shape.envelope = EnvelopeKind::Hull,
+    }
+}
+
+/// The document, and whether its tree bears leaves.
+fn looked_at(mut document: Document) -> Result<(Document, bool), PrepareError> {
+    let poses = std::mem::take(&mut document.poses);
+    let config = document.note.config.clone();
+    let options = TreeOptions {
+        config,
+        ..TreeOptions::default()
+    };
+    let tree = PreparedTree::new(document, options)?;
+    let in_leaf = !tree.dressed.foliage.groups.is_empty();
+    let document = Document {
+        poses,
+        ..tree.document
+    };
+    Ok((document, in_leaf))
+}
+
+/// A loop of the tree in the wind of the settings.
+fn in_wind(skeleton: &Skeleton, sway: &[Swaying], config: &Config) -> Vec<Pose> {
+    let scale = wind_scale(skeleton, config.export.metres_per_px, &config.wind);
+    let wind = Wind::new(&config.wind, LOOP_S, scale);
+    let known: Vec<Known> = sway.iter().map(Known::of).collect();
+    let mut animator = Animator::new(Arc::new(skeleton.clone()), &known, &config.wind, wind);
+    animator.close(LOOP_S, WIND_RATE_HZ);
+    let steps = (LOOP_S * WIND_RATE_HZ) as u64;
+    let mut poses = Vec::with_capacity(steps as usize + 1);
+    for k in 0..=steps {
+        poses.push(Pose {
+            time_s: k as f64 / WIND_RATE_HZ,
+            ..animator.pose(k)
+        });
+        animator.advance(1.0 / WIND_RATE_HZ);
+    }
+    poses
+}
+
+/// The outline of a document's tree, where it rests if that is known.
+///
+/// # Errors
+/// The document holds none.
+pub fn outline_of(document: &Document) -> Result<&Outline, PrepareError> {
+    let at_rest = document.outline_at_rest.as_ref();
+    at_rest
+        .or(document.outline.as_ref())
+        .ok_or_else(|| PrepareError::NoOutline {
+            dir: document.dir.clone(),
+        })
+}
+
+/// From the highest row of a region to its lowest, px.
+fn height_px(region: &Outline) -> f64 {
+    region
+        .bounds_px()
+        .map_or(0.0, |[_, top, _, bottom]| f64::from(bottom - top + 1))
+}
