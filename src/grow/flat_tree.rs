@@ -340,7 +340,7 @@ impl<'a> Growth<'a> {
         let gain_px = self.space.gain(ends_px[0], ends_px[1]) + self.gain_floor_px;
         let foot_px = self.tree[0].position_px;
         let densities = ends_px.map(|end| self.directions.density(outward(foot_px, apex, end)));
-        let likely = (densities[0] * densities[1]).sqrt().max(f64::MIN_POSITIVE);
+        let likely = (densities[0] * densities[1]).max(f64::MIN_POSITIVE);
         Some(Way {
             bifurcation: number,
             ends_px,
