@@ -172,17 +172,20 @@ impl FreeDecay<'_> {
         found.sway
     }
 
-    /// The trunk's sway: by its own points, where all points at once agree with it or show none. Its
-    /// own points show it more exactly, but take modes close together for one; in all points these
-    /// differ in their shapes.
+    /// The trunk's sway: by its own points, where all points at once agree with it, are less sure, or
+    /// show none. Its own points show it more exactly, but take modes close together for one; in all
+    /// points these differ in their shapes.
     fn or_fundamental(&mut self, trunk: &BranchInFilm, by_own_points: Swaying) -> Swaying {
         let Some(found) = self.fundamental else {
             return by_own_points;
         };
         let mode = mode_of(found.mode.mode, &found.mode.ln_sd);
         let own = self.own[trunk.node.index()];
+        let own_serves = own.is_some_and(|own| {
+            own.agrees_with(&mode) || own.ln_sd.frequency <= mode.ln_sd.frequency
+        });
         let is_sure = mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci);
-        if own.is_some_and(|own| own.agrees_with(&mode))
+        if own_serves
             || !is_sure
             || self
                 .limits
