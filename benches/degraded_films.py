@@ -12,7 +12,7 @@ by made_films/degraded.py, which says what each kind is, and replayed:
 A row for each film, one for each kind, which is compared with the films as they are ('as_filmed'):
 
   told, answers, right, in_95   as in films_told.py
-  kept       told, as a part of what is told of the films as they are
+  kept       told, as a part of that of the films as they are
   tripod     answers that are not right, and within 2 % of a frequency of the tripod
 
 A film of which PROGRAM makes no capture has its branches, and no answer. Then the captures of the films as they are, whose tracks are
@@ -34,7 +34,7 @@ from pathlib import Path
 
 import numpy as np
 
-from films_told import FILM_FILES, RIGHT_WITHIN, Film, ReplayFailed, Told, compare, pooled, refuse, replay, rows
+from films_told import RIGHT_WITHIN, Film, ReplayFailed, Told, compare, pooled, refuse, refuse_unless_films, replay, rows, share
 from made_films import degraded
 
 AS_FILMED = "as_filmed"
@@ -51,10 +51,7 @@ def main():
     parser.add_argument("--only", action="append", choices=[*degraded.KINDS, *DRAWS], metavar="KIND")
     args = parser.parse_args()
     program = shutil.which(args.program) or refuse(f"{args.program}: no program that can be run; build it, or give its path")
-    for folder in args.film_dir:
-        for name in FILM_FILES:
-            if not (folder / name).is_file():
-                refuse(f"{folder / name} is missing; benches/made_films.py makes films")
+    refuse_unless_films(args.film_dir)
     chosen = args.only or [*degraded.KINDS, *DRAWS]
     with tempfile.TemporaryDirectory(prefix="degraded_films_") as scratch:
         out = args.out or Path(scratch)
@@ -69,7 +66,7 @@ def capture_of(out, kind, folder):
 
 
 def replay_as_filmed(program, folders, out):
-    """What is told of each film as it is; those of which there is no capture are left out."""
+    """The score of each film as it is; those of which there is no capture are left out."""
     films = {}
     for folder in folders:
         try:
@@ -111,7 +108,6 @@ def told_of_disturbed(program, folder, out, kind, as_filmed):
 
 
 def film_line(name, width, kind, told, as_filmed):
-    share = lambda part, whole: f"{part / whole:.3f}" if whole else "-"
     recall = len(told.hz_errors) / max(told.branches, 1)
     undisturbed = len(as_filmed.hz_errors) / max(as_filmed.branches, 1)
     tripod = [hz for hz, right in zip(told.answers_hz, told.right) if not right and is_tripods(hz)]

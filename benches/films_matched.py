@@ -28,7 +28,7 @@ from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from films_told import FILM_FILES, Film, ReplayFailed, branch_of, by_node, followed_points, replay, rows
+from films_told import Film, ReplayFailed, branch_of, by_node, followed_points, refuse, refuse_unless_films, replay, rows
 
 WAYS = ["trunk", "place", "mode"]
 ALIKE = 0.5
@@ -60,10 +60,7 @@ def main():
     parser.add_argument("--captures", type=Path)
     args = parser.parse_args()
     program = shutil.which(args.program) or refuse(f"{args.program}: no program that can be run; build it, or give its path")
-    for folder in args.film_dir:
-        for name in FILM_FILES:
-            if not (folder / name).is_file():
-                refuse(f"{folder / name} is missing; benches/made_films.py makes films")
+    refuse_unless_films(args.film_dir)
     trees = of_one_tree(args.film_dir)
     for films in trees:
         if len(films) < 2:
@@ -86,11 +83,6 @@ def main():
             print(line(name, told[-1], width), flush=True)
     print(line(f"all {len(told)} of {len(trees)}", pooled(told), width))
     sys.exit(len(told) < len(trees))
-
-
-def refuse(why):
-    print(f"films_matched: {why}", file=sys.stderr)
-    sys.exit(2)
 
 
 def of_one_tree(folders):

@@ -76,10 +76,7 @@ def main():
     parser.add_argument("film_dir", type=Path, nargs="+")
     args = parser.parse_args()
     program = shutil.which(args.program) or refuse(f"{args.program}: no program that can be run; build it, or give its path")
-    for folder in args.film_dir:
-        for name in FILM_FILES:
-            if not (folder / name).is_file():
-                refuse(f"{folder / name} is missing; benches/made_films.py makes films")
+    refuse_unless_films(args.film_dir)
 
     width = max(len("all 999 of 999"), *(len(f.resolve().name) for f in args.film_dir))
     print(f"{'film':<{width}} branches  told answers right in_95 hz_err zeta_err seconds", flush=True)
@@ -99,8 +96,15 @@ def main():
     sys.exit(len(tolds) < len(args.film_dir))
 
 
+def refuse_unless_films(folders):
+    for folder in folders:
+        for name in FILM_FILES:
+            if not (folder / name).is_file():
+                refuse(f"{folder / name} is missing; benches/made_films.py makes films")
+
+
 def refuse(why):
-    print(f"films_told: {why}", file=sys.stderr)
+    print(f"{Path(sys.argv[0]).stem}: {why}", file=sys.stderr)
     sys.exit(2)
 
 
@@ -214,8 +218,11 @@ def pooled(tolds):
     return total
 
 
+def share(part, whole):
+    return f"{part / whole:.3f}" if whole else "-"
+
+
 def line(name, told, width):
-    share = lambda part, whole: f"{part / whole:.3f}" if whole else "-"
     middle = lambda errors, digits: f"{np.median(errors):.{digits}f}" if errors else "-"
     return (f"{name:<{width}} {told.branches:8} {share(len(told.hz_errors), told.branches):>5} {len(told.right):7}"
             f" {share(sum(told.right), len(told.right)):>5} {share(sum(told.in_interval), len(told.in_interval)):>5}"

@@ -11,7 +11,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use support::replayed_by_motion;
+use support::{names_in, replayed_by_motion};
 use tempfile::TempDir;
 
 const FAILED: i32 = 1;
@@ -98,15 +98,6 @@ fn others(dir: &Path) -> Vec<Vec<String>> {
     text.lines()
         .map(|l| l.split(',').take(10).map(str::to_owned).collect())
         .collect()
-}
-
-fn names_in(dir: &Path) -> Vec<String> {
-    let entries = fs::read_dir(dir).expect("folder").flatten();
-    let mut names: Vec<String> = entries
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
 }
 
 fn number(v: &Value) -> f64 {

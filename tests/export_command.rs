@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use support::replayed as made;
+use support::{names_in, replayed as made};
 use tempfile::TempDir;
 
 const FAILED: i32 = 1;
@@ -39,16 +39,6 @@ fn exported(format: &str, name: &str, more: &[&str]) -> (TempDir, PathBuf) {
     assert!(output.status.success(), "{told}");
     assert!(!told.contains("warning"), "{told}");
     (dir, out)
-}
-
-fn names_in(dir: &Path) -> Vec<String> {
-    let mut names: Vec<String> = fs::read_dir(dir)
-        .expect("folder")
-        .flatten()
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
 }
 
 /// Names of the joints, and how many triangles hang on them.

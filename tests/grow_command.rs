@@ -9,7 +9,7 @@ use arborcam::views::{Draft, write_document};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
-use support::replayed as example;
+use support::{names_in, replayed as example};
 
 const FAILED: i32 = 1;
 const BAD_USAGE: i32 = 2;
@@ -34,15 +34,6 @@ fn grown(out: &Path, more: &[&str]) -> Vec<Document> {
         trees.push(tree);
     }
     trees
-}
-
-fn names_in(dir: &Path) -> Vec<String> {
-    let entries = fs::read_dir(dir).expect("folder").flatten();
-    let mut names: Vec<String> = entries
-        .map(|e| e.file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    names
 }
 
 /// Every file below a folder with its bytes.

@@ -131,7 +131,7 @@ impl Animator {
         Self {
             branches,
             tuning,
-            joints: skeleton.nodes.iter().map(|n| at_rest(n.position)).collect(),
+            joints: skeleton.joints_at_rest(),
             turned: vec![Matrix3::identity(); n],
             borne: vec![Borne::default(); n],
             bases,
@@ -365,13 +365,6 @@ impl Animator {
         (now.position - foot)
             .angle(&(rest.position - foot))
             .to_degrees()
-    }
-}
-
-fn at_rest(position: Point3<f64>) -> JointPose {
-    JointPose {
-        position,
-        rotation: UnitQuaternion::identity(),
     }
 }
 

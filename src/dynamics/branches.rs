@@ -19,7 +19,7 @@ pub(super) const BELOW_NYQUIST: f64 = 0.9;
 const SAME_FREQ_SIGMAS: f64 = 2.0;
 /// The interval of the trunk, which all points move with and every film should show, may be so many
 /// times as wide as that of others.
-pub(super) const MAX_CI_OF_TRUNK: f64 = 3.0;
+const MAX_CI_OF_TRUNK: f64 = 3.0;
 
 /// Where modes are looked for.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,12 @@ impl SearchLimits {
     /// show it as a slow one.
     pub fn may_be_aliased(&self, frequency_hz: f64, film: &Film) -> bool {
         1.0 / film.step_s() - frequency_hz <= self.highest_hz
+    }
+
+    /// Whether a mode of all points is sure enough to answer for the trunk, and no faster one.
+    pub fn may_be_trunks(&self, mode: &BranchMode, film: &Film) -> bool {
+        mode.is_within(MAX_CI_OF_TRUNK * self.max_relative_ci)
+            && !self.may_be_aliased(mode.mode.frequency_hz, film)
     }
 }
 

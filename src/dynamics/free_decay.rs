@@ -6,13 +6,13 @@
 
 use super::branch_tree::BranchTree;
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, MAX_CI_OF_TRUNK,
-    SearchLimits, from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
+    from_the_trunk_up,
 };
 use super::decay::Mode;
 use super::film::Film;
 use super::fit::Prior;
-use super::members::{Points, mean_px, trunk};
+use super::members::{Points, mean_px};
 use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
@@ -61,7 +61,7 @@ const MIN_POINTS: usize = 4;
 /// like one.
 pub(super) const MIN_PERIODS: f64 = 3.0;
 /// Damping above which an oscillation is none that could be seen.
-pub(super) const MAX_DAMPING: f64 = 0.2;
+const MAX_DAMPING: f64 = 0.2;
 /// Motion that is taken for noise, px.
 const NOISE_PX: f64 = 0.2;
 /// Noise is at most this share of what the ancestors leave.
@@ -84,11 +84,11 @@ pub(super) fn sways(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
+    trunk: NodeId,
     onset: &Onset,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
-    let trunk = trunk(tree, members);
     let with_points = tree
         .branches
         .get(trunk.index())
@@ -184,13 +184,7 @@ impl FreeDecay<'_> {
         let own_serves = own.is_some_and(|own| {
             own.agrees_with(&mode) || own.ln_sd.frequency <= mode.ln_sd.frequency
         });
-        let is_sure = mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci);
-        if own_serves
-            || !is_sure
-            || self
-                .limits
-                .may_be_aliased(mode.mode.frequency_hz, self.film)
-        {
+        if own_serves || !self.limits.may_be_trunks(&mode, self.film) {
             return by_own_points;
         }
         self.own[trunk.node.index()] = Some(mode);
@@ -424,6 +418,13 @@ impl FreeDecay<'_> {
     }
 }
 
+/// Whether a tree may sway like a mode that was fitted to `signals`.
+pub(super) fn may_be_sway(signals: &Signals, mode: &Mode) -> bool {
+    mode.damping < MAX_DAMPING
+        && mode.frequency_hz * signals.span_s() >= MIN_PERIODS
+        && !signals.at_limit(mode)
+}
+
 /// A mode with the standard deviations that are believed.
 fn mode_of(mode: Mode, ln_sd: &LnDeviations) -> BranchMode {
     BranchMode {
@@ -515,18 +516,8 @@ impl FittedModes {
     /// Whether a branch may sway like mode `m`, and each of its `parts` does.
     fn may_be_own(&self, m: usize, parts: &[Vec<usize>]) -> bool {
         let mode = &self.fit.modes[m];
-        mode.damping < MAX_DAMPING
-            && mode.frequency_hz * self.span_s() >= MIN_PERIODS
-            && !self.signals.at_limit(mode)
+        may_be_sway(&self.signals, mode)
             && parts.iter().all(|p| is_in_most_points(&self.factors, m, p))
-    }
-
-    fn span_s(&self) -> f64 {
-        let times_s = &self.signals.times_s;
-        times_s
-            .last()
-            .zip(times_s.first())
-            .map_or(0.0, |(b, a)| b - a)
     }
 
     /// Why no mode is the branch's own.

@@ -132,6 +132,12 @@ impl Signals {
         }
     }
 
+    /// From the first time to the last, s.
+    pub fn span_s(&self) -> f64 {
+        let ends = self.times_s.last().zip(self.times_s.first());
+        ends.map_or(0.0, |(last, first)| last - first)
+    }
+
     /// Columns per mode.
     fn per_mode(&self) -> usize {
         match self.start {

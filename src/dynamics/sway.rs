@@ -14,7 +14,7 @@ use super::wind;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::config::{Dynamics, Excited};
-use crate::model::{Excitation, Skeleton, Swaying, TreeMode, Unidentified};
+use crate::model::{Excitation, NodeId, Skeleton, Swaying, TreeMode, Unidentified};
 use std::borrow::Cow;
 
 /// Fewer frames than this say nothing.
@@ -132,6 +132,8 @@ fn without_answers(tree: &BranchTree, film: &Film, reason: Unidentified) -> Anal
 pub(super) struct UsableFilm<'a> {
     /// Points of every branch and of all that it carries.
     pub members: Vec<Vec<usize>>,
+    /// The branch on the foot that most of them are on or above.
+    pub trunk: NodeId,
     pub onset: Onset,
     pub releases_s: Vec<f64>,
     pub limits: SearchLimits,
@@ -143,10 +145,11 @@ impl<'a> UsableFilm<'a> {
     /// The sway of one branch after the other, from the trunk up.
     fn one_by_one(&self, tree: &BranchTree, cancel: &CancelToken) -> Vec<Swaying> {
         let (film, limits) = (&self.film, &self.limits);
+        let (members, trunk) = (&self.members, self.trunk);
         match self.onset.excitation {
-            Excitation::Wind => wind::sways(tree, film, &self.members, limits, cancel),
+            Excitation::Wind => wind::sways(tree, film, members, trunk, limits, cancel),
             Excitation::Release => {
-                free_decay::sways(tree, film, &self.members, &self.onset, limits, cancel)
+                free_decay::sways(tree, film, members, trunk, &self.onset, limits, cancel)
             }
         }
     }
@@ -161,16 +164,12 @@ impl<'a> UsableFilm<'a> {
     ) -> Option<PointModes> {
         let (film, limits) = (&self.film, &self.limits);
         match self.onset.excitation {
-            Excitation::Wind => tree_modes::point_modes(tree, film, &self.members, limits, cancel),
-            Excitation::Release => modal::point_modes(
-                tree,
-                film,
-                &self.members,
-                &self.onset,
-                limits,
-                sways,
-                cancel,
-            ),
+            Excitation::Wind => {
+                tree_modes::point_modes(tree, film, &self.members, self.trunk, limits, cancel)
+            }
+            Excitation::Release => {
+                modal::point_modes(tree, film, self.trunk, &self.onset, limits, sways, cancel)
+            }
         }
     }
 
@@ -195,8 +194,8 @@ impl<'a> UsableFilm<'a> {
             Excited::Wind => Some(Excitation::Wind),
         };
         let members = members(tree, film);
-        let trunk = trunk(tree, &members).index();
-        let of_tree: &[usize] = members.get(trunk).map_or(&[], Vec::as_slice);
+        let trunk = trunk(tree, &members);
+        let of_tree: &[usize] = members.get(trunk.index()).map_or(&[], Vec::as_slice);
         let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz, cancel);
         if cancel.is_cancelled() {
             return Err(Unidentified::NotInTime);
@@ -207,6 +206,7 @@ impl<'a> UsableFilm<'a> {
         }
         Ok(Self {
             members,
+            trunk,
             onset,
             releases_s,
             limits: SearchLimits {

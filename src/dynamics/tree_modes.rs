@@ -11,7 +11,7 @@ use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::decay::Mode;
 use super::film::Film;
 use super::local_modes::{LocalMode, MOST_POINTS, local_modes};
-use super::members::{count_among, trunk};
+use super::members::count_among;
 use super::point_modes::{PointMode, PointModes};
 use super::sampling::Sampling;
 use crate::bounds::Bounds;
@@ -69,6 +69,7 @@ pub(super) fn point_modes(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
+    trunk: NodeId,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<PointModes> {
@@ -80,7 +81,7 @@ pub(super) fn point_modes(
     local.retain(counts);
     let voters: Vec<Voter> = local.iter().map(|m| Voter::of(m, members)).collect();
     let of_branches = modes_of_branches(tree, members, &voters);
-    let trunk = trunk(tree, members).index();
+    let trunk = trunk.index();
     let mut modes = Vec::new();
     for (branch, found) in of_branches.iter().enumerate() {
         // The trunk's is the fundamental of all points.

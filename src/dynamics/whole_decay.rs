@@ -9,7 +9,7 @@
 use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::decay::Mode;
 use super::film::Film;
-use super::free_decay::{MAX_DAMPING, MIN_PERIODS};
+use super::free_decay::may_be_sway;
 use super::gap_free::enough_seen;
 use super::members::{Points, mean_px};
 use super::motions::{Motions, OF_SUBSPACE};
@@ -144,17 +144,16 @@ fn asked(
 fn slowest(signals: &Signals, fit: &Fit) -> Option<Found> {
     let spread = deviations(signals, fit, &vec![None; fit.modes.len()])?;
     let factors = signals.factors(fit, OF_SUBSPACE);
-    let ends = signals.times_s.first().zip(signals.times_s.last());
-    let span_s = ends.map_or(0.0, |(first, last)| last - first);
     let mut energies = Vec::with_capacity(fit.modes.len());
     for (m, mode) in fit.modes.iter().enumerate() {
-        let may_be_tree_s = mode.damping < MAX_DAMPING
-            && mode.frequency_hz * span_s >= MIN_PERIODS
-            && !signals.at_limit(mode);
         let squares: f64 = factors.iter().map(|f| f[m].size().powi(2)).sum();
         // A decay lasts as long as its damping is small.
         let energy = squares / (mode.damping * mode.frequency_hz);
-        energies.push(if may_be_tree_s { energy } else { 0.0 });
+        energies.push(if may_be_sway(signals, mode) {
+            energy
+        } else {
+            0.0
+        });
     }
     let least = MIN_ENERGY * energies.iter().copied().fold(0.0, f64::max);
     let large = (0..energies.len()).filter(|m| energies[*m] > 0.0 && energies[*m] >= least);

@@ -10,15 +10,15 @@ use super::ambient;
 use super::branch_tree::BranchTree;
 use super::branch_turns::turn_of;
 use super::branches::{
-    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, MAX_CI_OF_TRUNK,
-    SearchLimits, from_the_trunk_up,
+    BranchEstimator, BranchInFilm, BranchMode, Estimate, LnDeviations, SearchLimits,
+    from_the_trunk_up,
 };
 use super::decay::Mode;
 use super::driven_modes::Spectrum;
 use super::driven_oscillators::{Driven, Oscillator, about_highest_hz};
 use super::film::Film;
 use super::gap_free::GapFree;
-use super::members::{Points, mean_px, trunk};
+use super::members::{Points, mean_px};
 use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
 use crate::cancel::CancelToken;
@@ -99,11 +99,12 @@ pub(super) fn sways(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
+    trunk: NodeId,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Vec<Swaying> {
     let mut estimator = InWind {
-        trunk: trunk(tree, members),
+        trunk,
         fundamental: None,
         tree,
         film,
@@ -227,11 +228,7 @@ impl InWind<'_> {
         if let Some(other) = &by_modes {
             mode = mode.agreed_with(&OWN_POINTS.mode_of(other.mode, &other.ln_sd));
         }
-        if !mode.is_within(MAX_CI_OF_TRUNK * self.limits.max_relative_ci)
-            || self
-                .limits
-                .may_be_aliased(mode.mode.frequency_hz, self.film)
-        {
+        if !self.limits.may_be_trunks(&mode, self.film) {
             return None;
         }
         let sway = Sway {

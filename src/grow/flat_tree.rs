@@ -382,8 +382,15 @@ fn branches(bifurcation: &Bifurcation, apex: Point2<f64>, below: Point2<f64>) ->
 
 /// The most probable of the ways, the first of equals; `None` of none.
 fn best(ways: Vec<Way>) -> Option<Way> {
-    let better = |best: Way, way: Way| if way.weight > best.weight { way } else { best };
-    ways.into_iter().reduce(better)
+    ways.into_iter().reduce(more_probable)
+}
+
+fn more_probable(first: Way, second: Way) -> Way {
+    if second.weight > first.weight {
+        second
+    } else {
+        first
+    }
 }
 
 #[cfg(test)]

@@ -7,11 +7,12 @@ use crate::random::Generator;
 use crate::signal::interpolation::linear;
 use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-/// Length of the pieces that a film is cut into, and of a loop that is learned from them, s. Longer ones tell frequencies
-/// apart that are nearer to each other, and there are fewer of them.
+/// Length of the pieces that a film is cut into, and of a loop that is learned from them, s. Longer
+/// ones tell frequencies apart that are nearer to each other, and there are fewer of them.
 pub const LOOP_S: f64 = 10.0;
 /// A film that is shorter shows no sway, s.
 const SHORTEST_FILM_S: f64 = 2.0;
@@ -84,11 +85,16 @@ impl MotionStatistics {
         let piece_s = LOOP_S.min(film_s);
         let rate_hz = ((times.len() - 1) as f64 / film_s).min(HIGHEST_RATE_HZ);
         let steps = 2 * ((0.5 * piece_s * rate_hz) as usize);
+        if steps < 2 * KEPT {
+            // A piece has no frequency that is kept.
+            return None;
+        }
         let pieces = Pieces {
             times: &times,
             count: (film_s / piece_s + 1e-9) as usize,
             piece_s,
             steps,
+            forward: RealFftPlanner::new().plan_fft_forward(steps),
         };
         let mut gathered = Gathered::default();
         for branch in skeleton.moving_branches() {
@@ -101,7 +107,6 @@ impl MotionStatistics {
                 gathered.add(level, &pieces.amplitudes(&turns, piece)?);
             }
         }
-        let deepest = skeleton.nodes.iter().map(|n| n.level).max()?;
         let axes = gathered.axes.map(|axis| AxisSpectrum {
             cosines: fit(&axis.cosines).map(|f| f.distribution),
             sines: fit(&axis.sines).map(|f| f.distribution),
@@ -115,7 +120,7 @@ impl MotionStatistics {
             levels: gathered.levels,
             steps,
             step_s: piece_s / steps as f64,
-            deepest,
+            deepest: skeleton.deepest_level(),
         })
     }
 
@@ -124,11 +129,11 @@ impl MotionStatistics {
     /// own plane.
     pub fn sample(&self, skeleton: &Skeleton, most_rad: f64, random: &mut Generator) -> Vec<Pose> {
         let branches = skeleton.moving_branches();
-        let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
+        let levels = LevelShares::of(skeleton);
         let mut turns: Vec<Vec<Vector3<f64>>> = Vec::with_capacity(branches.len());
         for branch in &branches {
             let node = &skeleton.nodes[branch.node.index()];
-            let share = f64::from(node.level) / f64::from(deepest.max(1));
+            let share = levels.of_node(branch.node);
             let into_plane = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
             let own = self.loop_of(share, random);
             let farthest = own.iter().map(Vector3::norm).fold(0.0, f64::max);
@@ -215,7 +220,6 @@ struct Tuples {
 
 impl Gathered {
     fn add(&mut self, level: u8, by_axis: &[Amplitudes; 3]) {
-        let energy = |of: &[f64]| of.iter().map(|a| a * a).sum::<f64>();
         let strength = Strength {
             cosines: std::array::from_fn(|axis| energy(&by_axis[axis].cosines)),
             sines: std::array::from_fn(|axis| energy(&by_axis[axis].sines)),
@@ -234,6 +238,10 @@ impl Gathered {
     }
 }
 
+fn energy(amplitudes: &[f64]) -> f64 {
+    amplitudes.iter().map(|a| a * a).sum()
+}
+
 /// The squares as shares of their sum; `None` where that is nothing.
 fn shares(amplitudes: &[f64], sum: f64) -> Option<Vec<f64>> {
     (sum >= LEAST_TURN * LEAST_TURN).then(|| amplitudes.iter().map(|a| a * a / sum).collect())
@@ -246,11 +254,12 @@ struct Pieces<'a> {
     count: usize,
     piece_s: f64,
     steps: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
 }
 
 impl Pieces<'_> {
-    /// The amplitudes of a branch that turns as `turns` says by pose, by axis. `None` where a piece
-    /// is too short to have frequencies.
+    /// The amplitudes of a branch that turns as `turns` says by pose, by axis. `None` where they are
+    /// no numbers.
     fn amplitudes(&self, turns: &[Vector3<f64>], piece: usize) -> Option<[Amplitudes; 3]> {
         let axes = [0, 1, 2].map(|axis| {
             let own: Vec<f64> = turns.iter().map(|t| t[axis]).collect();
@@ -264,9 +273,6 @@ impl Pieces<'_> {
 
     fn of_axis(&self, angles: &[f64], piece: usize) -> Option<Amplitudes> {
         let kept = self.steps / 2 / KEPT;
-        if kept == 0 {
-            return None;
-        }
         let (from_s, step_s) = (
             piece as f64 * self.piece_s,
             self.piece_s / self.steps as f64,
@@ -280,9 +286,8 @@ impl Pieces<'_> {
             let window = 0.5 - 0.5 * (TAU * k as f64 / self.steps as f64).cos();
             *angle = (*angle - mean) * window / HANN_ENERGY.sqrt();
         }
-        let forward = RealFftPlanner::<f64>::new().plan_fft_forward(self.steps);
-        let mut spectrum = forward.make_output_vec();
-        forward.process(&mut even, &mut spectrum).ok()?;
+        let mut spectrum = self.forward.make_output_vec();
+        self.forward.process(&mut even, &mut spectrum).ok()?;
         let scale = 2.0 / self.steps as f64;
         let bins = &spectrum[1..=kept];
         Some(Amplitudes {
@@ -292,10 +297,23 @@ impl Pieces<'_> {
     }
 }
 
-/// Level of a node as a share of the deepest of its tree.
-fn level_share(skeleton: &Skeleton, node: NodeId) -> f64 {
-    let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
-    f64::from(skeleton.nodes[node.index()].level) / f64::from(deepest.max(1))
+/// Levels as shares of the deepest of their tree.
+struct LevelShares<'a> {
+    skeleton: &'a Skeleton,
+    deepest: f64,
+}
+
+impl<'a> LevelShares<'a> {
+    fn of(skeleton: &'a Skeleton) -> Self {
+        Self {
+            skeleton,
+            deepest: f64::from(skeleton.deepest_level().max(1)),
+        }
+    }
+
+    fn of_node(&self, node: NodeId) -> f64 {
+        f64::from(self.skeleton.nodes[node.index()].level) / self.deepest
+    }
 }
 
 /// One of those whose level is nearest to the wanted one, at random: its place; `None` of none.
@@ -319,16 +337,17 @@ pub fn sample_sway(
     new: &Skeleton,
     random: &mut Generator,
 ) -> Vec<Swaying> {
+    let [of_example, of_new] = [example, new].map(LevelShares::of);
     let (mut known, mut levels) = (Vec::new(), Vec::new());
     for node in example.measured_branches() {
         if let Some(Ok(own)) = sway.get(node.index()) {
             known.push(*own);
-            levels.push(level_share(example, node));
+            levels.push(of_example.of_node(node));
         }
     }
     let mut drawn = vec![Err(Unidentified::NotMeasured); new.nodes.len()];
     for node in new.measured_branches() {
-        if let Some(of) = at_level(&levels, level_share(new, node), random) {
+        if let Some(of) = at_level(&levels, of_new.of_node(node), random) {
             drawn[node.index()] = Ok(known[of]);
         }
     }

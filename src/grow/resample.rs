@@ -78,6 +78,7 @@ pub fn resample(
         (node.kind, node.n_tracks) = (NodeKind::Grown, 0);
     }
     let flat = turned.clone();
+    let mut joints = flat.joints_at_rest();
     let mut turns = vec![0.0; flat.nodes.len()];
     for branch in measured_branches(&flat) {
         let own = match deviation(&flat, &branch) {
@@ -89,8 +90,11 @@ pub fn resample(
         let turn = turns[branch.parent.index()] + own;
         turns[branch.node.index()] = turn;
         if turn != 0.0 {
-            place(&mut turned, &flat, &branch, turn);
+            place(&mut joints, &flat, &branch, turn);
         }
+    }
+    for (node, joint) in turned.nodes.iter_mut().zip(joints) {
+        node.position = joint.position;
     }
     Ok(turned)
 }
@@ -110,20 +114,11 @@ fn drawn_for(
 }
 
 /// Puts a branch where it begins in `turned`, turned by `turn` against `flat`, radians.
-fn place(turned: &mut Skeleton, flat: &Skeleton, branch: &MovingBranch, turn: f64) {
-    let mut joints: Vec<JointPose> = Vec::with_capacity(turned.nodes.len());
-    for node in &turned.nodes {
-        joints.push(JointPose {
-            position: node.position,
-            rotation: UnitQuaternion::identity(),
-        });
-    }
+fn place(joints: &mut [JointPose], flat: &Skeleton, branch: &MovingBranch, turn: f64) {
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn);
-    branch.place(flat, rotation, &mut joints);
+    branch.place(flat, rotation, joints);
     for part in branch.parts() {
-        let node = &mut turned.nodes[part.index()];
-        node.position = joints[part.index()].position;
-        node.position.z = 0.0;
+        joints[part.index()].position.z = 0.0;
     }
 }
 

@@ -182,6 +182,12 @@ pub struct Rgb {
     pub pixels: Vec<u8>,
 }
 
+/// Brightness of a colour (ITU-R BT.601, the weights that JPEG and YUYV are made with).
+pub fn brightness(colour: [u8; 3]) -> u8 {
+    let [r, g, b] = colour.map(u32::from);
+    ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8
+}
+
 impl Rgb {
     /// The colour of the pixel at column `u` and row `v`; both must lie in the picture.
     pub fn at(&self, u: u32, v: u32) -> [u8; 3] {

@@ -43,7 +43,8 @@ pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use foot::{Foot, FootBasis, TrunkRow};
 pub use frame::{
-    Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, nanoseconds, seconds,
+    Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, brightness, nanoseconds,
+    seconds,
 };
 pub use hierarchy::{Cluster, ClusterId, MotionHierarchy};
 pub use leaf_swing::LeafSwing;

@@ -105,13 +105,7 @@ impl Skeleton {
         frame: u64,
         time_s: f64,
     ) -> Pose {
-        let mut joints: Vec<JointPose> = Vec::with_capacity(self.nodes.len());
-        for node in &self.nodes {
-            joints.push(JointPose {
-                position: node.position,
-                rotation: UnitQuaternion::identity(),
-            });
-        }
+        let mut joints = self.joints_at_rest();
         for (branch, turn) in branches.iter().zip(turns) {
             let own = UnitQuaternion::from_scaled_axis(*turn);
             let carried = joints[branch.parent.index()].rotation;

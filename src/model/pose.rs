@@ -14,6 +14,16 @@ pub struct JointPose {
     pub rotation: UnitQuaternion<f64>,
 }
 
+impl JointPose {
+    /// Of a node that stands at `position`, not turned.
+    pub fn at_rest(position: Point3<f64>) -> Self {
+        Self {
+            position,
+            rotation: UnitQuaternion::identity(),
+        }
+    }
+}
+
 /// One posture: a [`JointPose`] for every node of the skeleton, in its order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {

@@ -1,6 +1,6 @@
 //! The tree as joints and branches in 3D.
 
-use super::Size;
+use super::{JointPose, Size};
 use nalgebra::{Point2, Point3};
 
 /// What lies farther from the foot than this, or at a place that is no number, is neither read nor
@@ -150,6 +150,17 @@ impl Skeleton {
             .iter()
             .take_while(|n| n.copy_of.is_none())
             .count()
+    }
+
+    /// The highest level of a node.
+    pub fn deepest_level(&self) -> u8 {
+        self.nodes.iter().map(|n| n.level).max().unwrap_or(0)
+    }
+
+    /// Every node where it rests.
+    pub fn joints_at_rest(&self) -> Vec<JointPose> {
+        let positions = self.nodes.iter().map(|n| n.position);
+        positions.map(JointPose::at_rest).collect()
     }
 
     /// The measured nodes that move on their own, in order, without the foot.

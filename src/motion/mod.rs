@@ -22,7 +22,7 @@ pub use probabilistic::Problem;
 pub use spread::Spread;
 
 use crate::config::{Motion, MotionMethod};
-use crate::model::{JointPose, MovingBranch, Node, NodeId, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, NodeId, Pose, Skeleton};
 use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3, distance};
 use rotation::shortest_rotation;
 use std::f64::consts::PI;
@@ -85,13 +85,6 @@ impl Branch {
     }
 }
 
-fn resting(node: &Node) -> JointPose {
-    JointPose {
-        position: node.position,
-        rotation: UnitQuaternion::identity(),
-    }
-}
-
 /// The copy turns in its plane as the original does in its own.
 fn turn_of_copy(copy: &CopyOf, joints: &[JointPose]) -> UnitQuaternion<f64> {
     let parent_rotation = copy
@@ -142,7 +135,7 @@ impl PoseEstimator {
         // A clock that stands still must not forbid all motion.
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
-        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(resting).collect();
+        let mut joints = self.skeleton.joints_at_rest();
         let mut directions = vec![Vector3::y_axis(); joints.len()];
         for branch in &self.branches {
             let i = branch.way.node.index();

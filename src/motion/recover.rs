@@ -1,8 +1,8 @@
 //! The rotations of a pose of which only the places are known, as in a table that was written.
 
 use super::rotation::shortest_rotation;
-use super::{PoseEstimator, resting, turn_of_copy};
-use crate::model::{JointPose, Pose};
+use super::{PoseEstimator, turn_of_copy};
+use crate::model::Pose;
 use nalgebra::{Point3, Unit, UnitQuaternion};
 
 impl PoseEstimator {
@@ -11,7 +11,7 @@ impl PoseEstimator {
     /// copy as its original. Lengths are those at rest, whatever `places` says; what is missing or
     /// no number stays as its parent has it.
     pub fn recover(&self, frame: u64, time_s: f64, places: &[Point3<f64>]) -> Pose {
-        let mut joints: Vec<JointPose> = self.skeleton.nodes.iter().map(resting).collect();
+        let mut joints = self.skeleton.joints_at_rest();
         for branch in &self.branches {
             let parent = joints[branch.way.parent.index()].rotation;
             let own = match &branch.copy {

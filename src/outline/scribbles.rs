@@ -3,7 +3,7 @@
 
 use super::error::OutlineError;
 use super::region;
-use crate::model::{Outline, Size};
+use crate::model::{Outline, Size, brightness};
 use crate::signal::median;
 use image::RgbaImage;
 use std::path::Path;
@@ -106,8 +106,7 @@ pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
 
 /// Brightness of a pixel, `None` where it is more transparent than not.
 fn shade([r, g, b, opacity]: [u8; 4]) -> Option<u8> {
-    let [r, g, b] = [r, g, b].map(u32::from);
-    (opacity >= 128).then_some(((77 * r + 150 * g + 29 * b + 128) >> 8) as u8)
+    (opacity >= 128).then_some(brightness([r, g, b]))
 }
 
 fn mark(shade: Option<u8>) -> Mark {

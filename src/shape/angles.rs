@@ -19,7 +19,7 @@ pub struct Angles {
 impl Angles {
     /// As they are in `skeleton`, which still lies in its planes.
     pub fn of(skeleton: &Skeleton, settings: &config::Shape) -> Self {
-        let deepest = skeleton.nodes.iter().map(|n| n.level).max().unwrap_or(0);
+        let deepest = skeleton.deepest_level();
         Self {
             expected: expected_branching_angle(skeleton),
             deepest,

@@ -1,6 +1,6 @@
 //! Raw frames to pictures: luma for the tracker, a small one in colour for the screen.
 
-use crate::model::{Luma, PixelFormat, RawFrame, Rgb, Size};
+use crate::model::{Luma, PixelFormat, RawFrame, Rgb, Size, brightness};
 use turbojpeg::{Decompressor, Image, ScalingFactor};
 
 /// Some cheap cameras leave a few filling bytes before the end mark of every picture. They are
@@ -82,9 +82,7 @@ impl Decoder {
                     .iter_mut()
                     .zip(raw.bytes.chunks_exact(3))
                     .for_each(|(y, p)| {
-                        // BT.601, the weights that JPEG and YUYV are made with.
-                        let [r, g, b] = [p[0], p[1], p[2]].map(u32::from);
-                        *y = ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8;
+                        *y = brightness([p[0], p[1], p[2]]);
                     })
             }
         }

@@ -86,3 +86,13 @@ fn replayed_with(settings: &str) -> (TempDir, PathBuf) {
     );
     (dir, out)
 }
+
+/// Names of what a folder holds, in order.
+pub fn names_in(dir: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).expect("folder").flatten();
+    let mut names: Vec<String> = entries
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}

@@ -19,7 +19,6 @@ use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
-use super::members::trunk;
 use super::point_modes::{PointMode, PointModes, mode_of};
 use super::release::Onset;
 use crate::bounds::Bounds;
@@ -52,20 +51,18 @@ const MIN_LN_SD: LnDeviations = LnDeviations {
 };
 
 /// The modes of all points at once, from the captured tree with the answers of `sways`; `None` where
-/// too little is seen, or `cancel` ends it before. `members` are the points of every branch and of
-/// all that it carries.
+/// too little is seen, or `cancel` ends it before.
 pub(super) fn point_modes(
     tree: &BranchTree,
     film: &Film,
-    members: &[Vec<usize>],
+    trunk: NodeId,
     onset: &Onset,
     limits: &SearchLimits,
     sways: &[Swaying],
     cancel: &CancelToken,
 ) -> Option<PointModes> {
     // All points have the trunk's sway: without it nothing is sure.
-    let trunk = trunk(tree, members).index();
-    if !sways.get(trunk).is_some_and(Result::is_ok) {
+    if !sways.get(trunk.index()).is_some_and(Result::is_ok) {
         return None;
     }
     let thinned = ThinnedFilm::of(film, onset);
@@ -301,6 +298,7 @@ mod tests {
         let tree = BranchTree::of(skeleton);
         let Ok(UsableFilm {
             members,
+            trunk,
             onset,
             limits,
             film,
@@ -309,9 +307,8 @@ mod tests {
         else {
             return Vec::new();
         };
-        let sways = free_decay::sways(&tree, &film, &members, &onset, &limits, &cancel);
-        let Some(found) = point_modes(&tree, &film, &members, &onset, &limits, &sways, &cancel)
-        else {
+        let sways = free_decay::sways(&tree, &film, &members, trunk, &onset, &limits, &cancel);
+        let Some(found) = point_modes(&tree, &film, trunk, &onset, &limits, &sways, &cancel) else {
             return Vec::new();
         };
         let own = found.modes.iter().map(|mode| mode.tracks.clone());

@@ -1,6 +1,6 @@
 //! A drawn shape, and where it stands in the picture.
 
-use crate::model::{Outline, Size, bounds_px};
+use crate::model::{Outline, Size, bounds_px, brightness};
 use crate::signal::statistics::otsu;
 use nalgebra::Point2;
 
@@ -150,7 +150,10 @@ impl Drawn {
 
 /// Which pixels of an opaque picture are the shape; `None` where all are alike.
 fn of_brightness(size: Size, rgba: &[u8]) -> Option<Vec<bool>> {
-    let luma: Vec<u8> = rgba.chunks_exact(4).map(brightness).collect();
+    let luma: Vec<u8> = rgba
+        .chunks_exact(4)
+        .map(|p| brightness([p[0], p[1], p[2]]))
+        .collect();
     let mut counts = [0_u32; 256];
     for l in &luma {
         counts[usize::from(*l)] += 1;
@@ -164,12 +167,6 @@ fn of_brightness(size: Size, rgba: &[u8]) -> Option<Vec<bool>> {
     let is_mask = extreme as f64 >= MASK * luma.len() as f64;
     let is_inverted = !is_mask && 2 * bright_on_border(size, &bright) > border_length(size);
     Some(bright.iter().map(|b| *b != is_inverted).collect())
-}
-
-/// ITU-R BT.601.
-fn brightness(pixel: &[u8]) -> u8 {
-    let [r, g, b] = [pixel[0], pixel[1], pixel[2]].map(u32::from);
-    ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8
 }
 
 /// Number of pixels on the border of a picture, those in a corner counted twice.

@@ -148,10 +148,7 @@ impl Topiary {
     /// says. Every branch turns against its parent as the measured one does of which it is a copy,
     /// in its own plane.
     pub fn pose(&self, skeleton: &Skeleton, whole: &Pose) -> Pose {
-        let still = JointPose {
-            position: Point3::origin(),
-            rotation: UnitQuaternion::identity(),
-        };
+        let still = JointPose::at_rest(Point3::origin());
         let foot = whole.joints.first().copied().unwrap_or(still);
         let mut joints = vec![foot; self.skeleton.nodes.len()];
         for branch in self.skeleton.moving_branches() {
