@@ -255,8 +255,9 @@ settings! {
         excitation: Excited = Excited::Auto;
         /// The last seconds of a film that are analysed, s. More if the release is farther back.
         window_s: f64 [5 to 600] = 60.0;
-        /// Frequencies are estimated again after this much film, s. More if the machine is slow, or
-        /// if `--fast` with `--stream` takes too long.
+        /// Frequencies are estimated again after this much film, s, or when it has grown by a tenth
+        /// if that is later. More if the machine is slow, or if `--fast` with `--stream` takes too
+        /// long.
         every_s: f64 [0 ("only at the end") to 600] = 1.0;
         /// Highest frequency that a branch may have, Hz. More if the tree is small and sways
         /// faster; less if a film of few frames per second says "above_sampling" and nothing sways

@@ -103,6 +103,11 @@ pub struct SwayJob {
 }
 
 impl SwayJob {
+    /// Length of the film that is analysed, s.
+    pub fn span_s(&self) -> f64 {
+        self.log.last(self.settings.window_s).span_s()
+    }
+
     /// The sway of every branch, and the spectra of the angles. Branches that were not looked at
     /// when `cancel` ended the work are
     /// [`NotInTime`](Unidentified::NotInTime).

@@ -1,10 +1,11 @@
 //! The sway is analysed again and again in the background, while the film goes on.
 //!
-//! A request is made when so much film has passed, and its result takes effect when the next one is
-//! due: at a moment of film, not of the clock. A fast replay waits for it there, so that the same
-//! recording gives the same answers at the same frames whatever the machine. A camera, or a
-//! recording at its own pace, waits for nobody: what is not ready is looked at again when the next
-//! one is due, and the request that finds the last one under way is passed over and counted.
+//! At moments so far apart in the film a request is made where the film has grown by enough since
+//! the last one, and the result of that takes effect: at a moment of film, not of the clock. A fast
+//! replay waits for it there, so that the same recording gives the same answers at the same frames
+//! whatever the machine. A camera, or a recording at its own pace, waits for nobody: what is not
+//! ready is looked at again at the next moment, and the request that finds the last one under way is
+//! passed over and counted.
 
 use super::background::{Background, Missing, Pending};
 use super::pulse::{Pulse, Worker};
@@ -14,6 +15,10 @@ use crate::model::SwayNow;
 use crate::pipeline::SwayJob;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+
+/// A film is analysed again when there is so much more of it, as a share of what the last analysis
+/// had: a longer one takes more time and changes the answers less.
+const MIN_GROWTH: f64 = 0.1;
 
 /// Works a job off; asks again and again whether to go on, which is its sign of life, too.
 pub type Analyser = fn(&SwayJob, &CancelToken) -> SwayNow;
@@ -27,13 +32,14 @@ pub struct Swaying {
     shared: Arc<Shared>,
     background: Background,
     pending: Option<Pending<SwayNow>>,
-    /// Time of film at which the next request is due, s.
+    /// Time of film of the next moment, and of the next request, s.
     next_s: f64,
+    due_s: f64,
     passed_over: u64,
 }
 
 impl Swaying {
-    /// Asks every `every_s` seconds of film, never if that is 0.
+    /// Asks every `every_s` seconds of film at most, never if that is 0.
     pub fn new(
         every_s: f64,
         waits: bool,
@@ -41,7 +47,6 @@ impl Swaying {
         background: Background,
         shared: Arc<Shared>,
     ) -> Self {
-        let next_s = f64::NEG_INFINITY;
         Self {
             every_s,
             waits,
@@ -49,7 +54,8 @@ impl Swaying {
             shared,
             background,
             pending: None,
-            next_s,
+            next_s: f64::NEG_INFINITY,
+            due_s: f64::NEG_INFINITY,
             passed_over: 0,
         }
     }
@@ -61,7 +67,9 @@ impl Swaying {
 
     /// Forgets what is under way.
     pub fn restart(&mut self) {
-        (self.pending, self.next_s) = (None, f64::NEG_INFINITY);
+        self.pending = None;
+        self.next_s = f64::NEG_INFINITY;
+        self.due_s = f64::NEG_INFINITY;
     }
 
     /// At the frame of this time: the result that takes effect with it, if there is one, and the
@@ -73,9 +81,13 @@ impl Swaying {
         }
         self.next_s = time_s + self.every_s;
         let found = self.take();
+        if time_s < self.due_s {
+            return found;
+        }
         if self.pending.is_some() {
             self.passed_over += 1;
         } else if let Some(job) = job() {
+            self.due_s = time_s + MIN_GROWTH * job.span_s();
             self.ask(job);
         }
         found

@@ -4,7 +4,7 @@ use super::super::pulse::{Sign, Vigil};
 use super::*;
 use crate::cancel::CancelToken;
 use crate::config::Dynamics;
-use crate::model::{Angles, Skeleton, TrackLog};
+use crate::model::{Angles, Skeleton, TrackLog, TrackSet};
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
@@ -112,6 +112,29 @@ fn a_replay_waits_for_every_answer_where_it_is_due() {
         );
         assert_eq!(swaying.passed_over(), 0);
     }
+}
+
+/// Of 30 s of film the next analysis is due 3 s later, of 60 s 6 s later; the answer comes as soon as
+/// before.
+#[test]
+fn a_longer_film_is_analysed_less_often() {
+    let (mut swaying, _) = of(at_once, true);
+    let mut told = Vec::new();
+    for second in [30, 31, 32, 33, 34, 60, 61, 65, 66, 67] {
+        let time_s = f64::from(second);
+        let mut long = job(time_s);
+        long.log = TrackLog::new(100.0);
+        for (frame, time_s) in [(0, 0.0), (long.frame, time_s)] {
+            long.log.push(TrackSet {
+                frame,
+                time_s,
+                ..TrackSet::default()
+            });
+        }
+        let found = swaying.step(time_s, || Some(long));
+        told.extend(found.map(|found| (second, found.time_s)));
+    }
+    assert_eq!(told, [(31, 30.0), (34, 33.0), (61, 60.0), (67, 66.0)]);
 }
 
 #[test]
