@@ -6,6 +6,7 @@ mod branch_tree;
 mod branch_turns;
 mod branches;
 mod decay;
+mod decaying_motions;
 mod dominant_peaks;
 mod driven_likelihood;
 mod driven_modes;

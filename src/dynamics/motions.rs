@@ -20,12 +20,14 @@ pub(super) struct Motions {
     variances: Vec<f64>,
     /// Of length 1, in all signals at once: u and v of each point in turn.
     directions: Vec<Vec<f64>>,
+    /// Variance that noise has in every value, px².
+    noise: f64,
 }
 
 impl Motions {
     /// Of `points` in `frames` of `film`, each some neighbours taken together.
     pub fn of(film: &Film, points: &Points, frames: &[Vec<usize>]) -> Self {
-        let signals = GapFree::of(points, frames).signals;
+        let GapFree { signals, noise } = GapFree::of(points, frames);
         let mut principal = PrincipalComponents::of_signals(&signals);
         principal.directions.truncate(MOST);
         principal.variances.truncate(MOST);
@@ -41,6 +43,7 @@ impl Motions {
             along: motions,
             variances: principal.variances,
             directions: principal.directions,
+            noise,
         }
     }
 
@@ -62,6 +65,13 @@ impl Motions {
             out.push(motion.iter().map(|x| x / scale).collect());
         }
         out
+    }
+
+    /// Squares that noise makes in all of [`of_like_size`](Self::of_like_size).
+    pub fn noise_of_like_size(&self) -> f64 {
+        let scales = self.scales().take(OF_SUBSPACE);
+        let per_time: f64 = scales.map(|scale| self.noise / (scale * scale)).sum();
+        per_time * self.times_s.len() as f64
     }
 
     /// What [`of_like_size`](Self::of_like_size) divides each motion by, px.

@@ -7,6 +7,7 @@
 use super::decay::{Mode, Start};
 use super::mode_search::mode_grid;
 use crate::bounds::Bounds;
+use crate::cancel::CancelToken;
 use crate::signal::extension::{Extension, Residual};
 use crate::signal::gram::{GramCholesky, gram, gram_without};
 use crate::signal::qr::Qr;
@@ -183,6 +184,32 @@ impl Signals {
             }
         }
         rss
+    }
+
+    /// A fit of modes that are found one after the other, `most` or as many as there are; `None` where
+    /// `cancel` ends the search before.
+    pub fn fit_modes(&self, most: usize, cancel: &CancelToken) -> Option<Fit> {
+        let mut fit = Fit {
+            rss: self.squares(),
+            ..Fit::default()
+        };
+        for _ in 0..most {
+            if cancel.is_cancelled() {
+                return None;
+            }
+            let Some(new) = self.search(&fit) else {
+                break;
+            };
+            fit.modes.push(new);
+            fit = self.fit(&fit, &[]);
+        }
+        Some(fit)
+    }
+
+    /// Sum of the squares of all values.
+    pub fn squares(&self) -> f64 {
+        let values = self.groups.iter().flat_map(|group| &group.values);
+        values.flatten().map(|x| x * x).sum()
     }
 
     /// The mode that takes off most of what a fit leaves, by trying.

@@ -8,28 +8,19 @@
 
 use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::decay::Mode;
+use super::decaying_motions::DecayingMotions;
 use super::film::Film;
 use super::free_decay::may_be_sway;
-use super::gap_free::enough_seen;
-use super::members::{Points, mean_px};
+use super::members::mean_px;
 use super::motions::{Motions, OF_SUBSPACE};
-use super::release::{Onset, RELEASE_SD_FRAMES};
+use super::release::Onset;
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
-use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::signal::statistics::quantile;
 use nalgebra::{DVector, Point2};
 
-/// Points that are used at most.
-const MOST_POINTS: usize = 120;
-/// Neighbouring frames are taken together to so many a second, and frequencies are looked for up to
-/// this share of them.
-const FRAMES_PER_S: f64 = 15.0;
-const MAX_FREQ_OF_RATE: f64 = 0.3;
-/// Frames that are needed.
-const MIN_FRAMES: usize = 32;
 /// Numbers of modes that are asked.
 const LEAST_MODES: usize = 3;
 const MOST_MODES: usize = 7;
@@ -57,15 +48,12 @@ pub(super) fn fundamental(
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<Fundamental> {
-    let points = Points::up_to(MOST_POINTS, film, tracks, 0);
-    let every = (film.frames_per_period(FRAMES_PER_S) + 0.01).max(1.0);
-    let mut frames = film.neighbours(onset.from..film.times_s.len(), every as usize);
-    frames.retain(|of| enough_seen(&points, of));
-    if 2 * points.tracks.len() < OF_SUBSPACE || frames.len() < MIN_FRAMES {
+    let decaying = DecayingMotions::since(onset.from, film, tracks)?;
+    let points = &decaying.points;
+    if 2 * points.tracks.len() < OF_SUBSPACE {
         return None;
     }
-    let motions = Motions::of(film, &points, &frames);
-    let found = asked(&motions, film, onset, limits, cancel)?;
+    let found = asked(&decaying, onset, limits, cancel)?;
     if 2 * found.len() <= MOST_MODES - LEAST_MODES {
         return None;
     }
@@ -91,7 +79,7 @@ pub(super) fn fundamental(
             mode: nearest.mode,
             ln_sd: nearest.ln_sd.inflated(1.0, &least),
         },
-        amplitude_deg: arms.amplitude_deg(&in_points(&motions, &nearest.factors), 0),
+        amplitude_deg: arms.amplitude_deg(&in_points(&decaying.motions, &nearest.factors), 0),
     })
 }
 
@@ -105,23 +93,12 @@ struct Found {
 
 /// The fundamental by each number of modes that has one.
 fn asked(
-    motions: &Motions,
-    film: &Film,
+    decaying: &DecayingMotions,
     onset: &Onset,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<Vec<Found>> {
-    let highest_hz = limits
-        .frequencies_hz
-        .hi
-        .min(MAX_FREQ_OF_RATE / motions.step_s());
-    let signals = Signals::new(
-        motions.times_s.iter().map(|t| t - onset.at_s).collect(),
-        &motions.of_like_size(),
-        onset.start,
-        RELEASE_SD_FRAMES * film.step_s(),
-        Bounds::new(limits.frequencies_hz.lo, highest_hz),
-    );
+    let signals = decaying.signals(onset.at_s, onset.start, limits.frequencies_hz);
     let mut out = Vec::new();
     let mut fit = Fit::default();
     for modes in 1..=MOST_MODES {
@@ -193,6 +170,7 @@ fn in_points(motions: &Motions, factors: &[Factor]) -> Vec<Vec<Factor>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::Bounds;
     use crate::dynamics::decay::Start;
     use crate::dynamics::film::FilmTrack;
     use crate::model::{Excitation, NodeId};

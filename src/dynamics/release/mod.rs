@@ -11,9 +11,10 @@ mod motion;
 mod repeated;
 
 use super::decay::Start;
+use super::decaying_motions::{DecayingMotions, MAX_NOISE_SHARE};
 use super::film::Film;
 use super::members::{Points, evenly_chosen};
-use super::signals::{Fit, Signals};
+use super::signals::Signals;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::Excitation;
@@ -23,24 +24,23 @@ use repeated::{REST_S, parts};
 
 /// Points that are looked at.
 const MAX_POINTS: usize = 24;
-/// Modes by which a decay of the whole tree is described here.
+/// Modes by which a decay of some points is described, and that of all points' principal motions.
 const MODES: usize = 3;
+const MODES_OF_ALL: usize = 6;
 /// What a motion must do to be a free decay, where it is not seen from rest on and where it is.
 /// Wind that happens to fade is not rare in a short film.
 const FROM_MOTION: DecayCriteria = DecayCriteria {
-    max_left: 0.15,
+    max_left: 0.075,
     max_energy_ratio: 0.35,
 };
 const FROM_REST: DecayCriteria = DecayCriteria {
-    max_left: 0.25,
+    max_left: 0.1,
     max_energy_ratio: 0.5,
 };
 /// Rest is believed as the start if its fit leaves at most so many times the squares that a free
 /// one does.
 const MAX_RSS_FROM_REST: f64 = 1.3;
-/// Noise is at most this share of the motion; and at least this share of the noise counts as left
-/// by a free fit.
-const MAX_NOISE_SHARE: f64 = 0.5;
+/// At least this share of the noise counts as left by a free fit.
 const MIN_LEFT_OF_NOISE: f64 = 0.1;
 /// Standard deviation of the moment of a release, in frames, before all modes have their say in it.
 pub(super) const RELEASE_SD_FRAMES: f64 = 0.7;
@@ -52,7 +52,7 @@ const MIN_FRAMES: usize = 32;
 
 /// What a free decay is known by.
 struct DecayCriteria {
-    /// Share of the motion that its modes leave at most.
+    /// Share of the principal motions of all points that [`MODES_OF_ALL`] modes leave at most.
     max_left: f64,
     /// Energy of the last third against that of the first, at most.
     max_energy_ratio: f64,
@@ -176,18 +176,17 @@ fn of_one(
     {
         return wind;
     }
-    let Some(left) = decay.left_by(Start::Moving, MODES) else {
-        return wind;
-    };
-    let all = decay.points.squares();
-    let noise = decay.points.noise().min(MAX_NOISE_SHARE * all);
-    let is_described = left - noise < criteria.max_left * (all - noise);
-    if given.is_none() && !is_described {
-        return wind;
+    if given.is_none() {
+        let left = DecayingMotions::since(motion.from, film, tracks).and_then(|motions| {
+            motions.share_left(MODES_OF_ALL, motion.at_s, frequencies_hz, cancel)
+        });
+        if left.is_none_or(|left| left > criteria.max_left) {
+            return wind;
+        }
     }
     Onset {
         excitation: Excitation::Release,
-        start: if motion.rested && decay.fits_rest(left, noise) {
+        start: if motion.rested && decay.fits_rest() {
             Start::Rest
         } else {
             Start::Moving
@@ -215,8 +214,8 @@ struct Decay<'a> {
 }
 
 impl Decay<'_> {
-    /// What `n` modes that describe most of the motion leave of it, px²; `None` where there are not
-    /// so many, or `cancel` ends the search before.
+    /// What `n` modes that describe most of the motion of the points leave of it, px²; `None` where
+    /// there are not so many, or `cancel` ends the search before.
     fn left_by(&self, start: Start, n: usize) -> Option<f64> {
         let signals = Signals::new(
             self.times_s.clone(),
@@ -225,26 +224,22 @@ impl Decay<'_> {
             self.release_sd_s,
             self.frequencies_hz,
         );
-        let mut fit = Fit::default();
-        for _ in 0..n {
-            if self.cancel.is_cancelled() {
-                return None;
-            }
-            let new = signals.search(&fit)?;
-            fit.modes.push(new);
-            fit = signals.fit(&fit, &[]);
-        }
-        Some(fit.rss)
+        signals.fit_modes(n, self.cancel).map(|fit| fit.rss)
     }
 
-    /// Whether modes that all start from rest describe it as well as free ones, which leave
-    /// `left`.
-    fn fits_rest(&self, left: f64, noise: f64) -> bool {
+    /// Whether modes that all start from rest describe it as well as free ones.
+    fn fits_rest(&self) -> bool {
+        let free = self.left_by(Start::Moving, MODES);
         // As many columns as the free fit has.
-        let Some(from_rest) = self.left_by(Start::Rest, 2 * MODES) else {
+        let from_rest = self.left_by(Start::Rest, 2 * MODES);
+        let Some((free, from_rest)) = free.zip(from_rest) else {
             return false;
         };
-        let least = (left - noise).max(MIN_LEFT_OF_NOISE * noise);
+        let noise = self
+            .points
+            .noise()
+            .min(MAX_NOISE_SHARE * self.points.squares());
+        let least = (free - noise).max(MIN_LEFT_OF_NOISE * noise);
         from_rest - noise < MAX_RSS_FROM_REST * least
     }
 }
