@@ -1,7 +1,8 @@
 //! The shape of forks, whatever their place, direction and size (Li 2011 sect. 5.1).
 
 use crate::skeleton::Node2d;
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
+use std::cmp::Ordering;
 use std::f64::consts::TAU;
 
 /// A branch shorter than this share of its fork has no direction.
@@ -29,41 +30,79 @@ impl Bifurcation {
     }
 }
 
+/// A bifurcation of a tree, and how many forks into two its left and right branch carry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Fork {
+    pub shape: Bifurcation,
+    pub carried: [usize; 2],
+}
+
+impl Fork {
+    /// With the branch that carries more on the left, twice; where both carry as much either is.
+    pub fn leading_left(&self) -> [Bifurcation; 2] {
+        let [own, mirrored] = [self.shape, self.shape.mirrored()];
+        match self.carried[0].cmp(&self.carried[1]) {
+            Ordering::Greater => [own, own],
+            Ordering::Less => [mirrored, mirrored],
+            Ordering::Equal => [own, mirrored],
+        }
+    }
+}
+
 /// The bifurcations of a flat tree, by the place of their apex, from left to right.
 ///
 /// Where more than two branches leave, every two neighbours make one with the stem. What leaves
 /// from the foot has no stem; a fork with a branch without length, or at a place that is no number,
 /// is left out.
 pub fn bifurcations(tree: &[Node2d]) -> Vec<Bifurcation> {
+    forks(tree).into_iter().map(|fork| fork.shape).collect()
+}
+
+/// The same, with what they carry.
+pub(super) fn forks(tree: &[Node2d]) -> Vec<Fork> {
+    let children = children(tree);
+    let carried = carried_forks(tree, &children);
+    let mut found = Vec::new();
+    for (i, node) in tree.iter().enumerate() {
+        let Some(parent) = node.parent else { continue };
+        let apex = node.position_px;
+        let down = tree[parent].position_px - apex;
+        let mut branches: Vec<Branch> = Vec::with_capacity(children[i].len());
+        for &child in &children[i] {
+            branches.push(Branch::of(
+                down,
+                tree[child].position_px - apex,
+                carried[child],
+            ));
+        }
+        branches.sort_by(|a, b| a.bearing.total_cmp(&b.bearing));
+        let pairs = branches.windows(2);
+        found.extend(pairs.filter_map(|pair| fork(down.norm(), pair[0], pair[1])));
+    }
+    found
+}
+
+/// The children of every node, in order.
+pub(super) fn children(tree: &[Node2d]) -> Vec<Vec<usize>> {
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); tree.len()];
     for (i, node) in tree.iter().enumerate() {
         if let Some(parent) = node.parent {
             children[parent].push(i);
         }
     }
-    let mut found = Vec::new();
-    for (i, node) in tree.iter().enumerate() {
-        let Some(parent) = node.parent else { continue };
-        let (apex, stem) = (node.position_px, tree[parent].position_px);
-        let ends = children[i].iter().map(|c| tree[*c].position_px);
-        found.extend(of_fork(apex, stem, ends));
-    }
-    found
+    children
 }
 
-/// The bifurcations of the branches from `apex` to `ends`, with the stem coming from `stem`, px.
-fn of_fork(
-    apex: Point2<f64>,
-    stem: Point2<f64>,
-    ends: impl Iterator<Item = Point2<f64>>,
-) -> Vec<Bifurcation> {
-    let down = stem - apex;
-    let mut branches: Vec<Branch> = ends.map(|end| Branch::of(down, end - apex)).collect();
-    branches.sort_by(|a, b| a.bearing.total_cmp(&b.bearing));
-    let pairs = branches.windows(2);
-    pairs
-        .filter_map(|pair| bifurcation(down.norm(), pair[0], pair[1]))
-        .collect()
+/// Number of forks into two at and above every node; a fork into more counts as one less than it has
+/// branches.
+pub(super) fn carried_forks(tree: &[Node2d], children: &[Vec<usize>]) -> Vec<usize> {
+    let mut carried: Vec<usize> = children.iter().map(|c| c.len().saturating_sub(1)).collect();
+    for i in (1..tree.len()).rev() {
+        if let Some(parent) = tree[i].parent {
+            carried[parent] += carried[i];
+        }
+    }
+    carried
 }
 
 /// A branch that leaves a fork.
@@ -73,28 +112,34 @@ struct Branch {
     /// from 0 to 2 pi.
     bearing: f64,
     length_px: f64,
+    /// Number of forks into two that it carries.
+    carried: usize,
 }
 
 impl Branch {
-    fn of(down: Vector2<f64>, way: Vector2<f64>) -> Self {
+    fn of(down: Vector2<f64>, way: Vector2<f64>, carried: usize) -> Self {
         Self {
             bearing: down.perp(&way).atan2(down.dot(&way)).rem_euclid(TAU),
             length_px: way.norm(),
+            carried,
         }
     }
 }
 
-fn bifurcation(stem_px: f64, left: Branch, right: Branch) -> Option<Bifurcation> {
+fn fork(stem_px: f64, left: Branch, right: Branch) -> Option<Fork> {
     let lengths = [stem_px, left.length_px, right.length_px];
     let all: f64 = lengths.iter().sum();
     let has_shape = all.is_finite() && lengths.iter().all(|l| *l > SHORTEST * all);
-    has_shape.then(|| Bifurcation {
-        angles: [
-            left.bearing / TAU,
-            (right.bearing - left.bearing) / TAU,
-            1.0 - right.bearing / TAU,
-        ],
-        lengths: lengths.map(|l| l / all),
+    has_shape.then(|| Fork {
+        shape: Bifurcation {
+            angles: [
+                left.bearing / TAU,
+                (right.bearing - left.bearing) / TAU,
+                1.0 - right.bearing / TAU,
+            ],
+            lengths: lengths.map(|l| l / all),
+        },
+        carried: [left.carried, right.carried],
     })
 }
 

@@ -1,7 +1,7 @@
 //! A new flat tree, grown fork by fork from root to leaf (Li 2011 sect. 5.3).
 
 use super::dirichlet::{Dirichlet, DirichletFit, fit};
-use super::features::{Bifurcation, bifurcations};
+use super::features::{Bifurcation, Fork, carried_forks, children, forks};
 use super::fork_tree::fork_tree;
 use super::space::GrowthSpace;
 use super::von_mises::VonMises;
@@ -16,13 +16,14 @@ use std::f64::consts::TAU;
 /// An example with fewer forks says nothing on what forks are like.
 pub const FEWEST_FORKS: usize = 3;
 /// Bifurcations that are looked at for one leaf, at first, each with its mirror image.
-const HAND: usize = 12;
-/// Leaves of which that with the longest branch goes on: large gaps are closed first.
-const LEAVES: u32 = 3;
+const HAND: usize = 24;
 /// Trees of which the one that fills the region best is taken.
 const TREES: u32 = 8;
-/// How often bifurcations are sampled anew in place of those that fit nowhere.
+/// How often bifurcations are tried: first where they are to grow, then at random tips.
 const ROUNDS: u32 = 4;
+/// A direction that is less likely than this, as a share of the likeliest, is not taken: without it
+/// 95 % of a normal distribution are left.
+const LEAST_LIKELIHOOD: f64 = 0.147;
 /// No branch is shorter than this share of the region's height.
 const SHORTEST: f64 = 0.01;
 /// A direction that brings every place nearer by this share of the region's width says next to
@@ -37,14 +38,39 @@ pub struct ForkStatistics {
     /// Learned from them and their mirror images, so that left and right are alike.
     pub angles: DirichletFit,
     pub lengths: DirichletFit,
+    /// The same of bifurcations whose left branch leads on: it carries more. Where both carry as
+    /// much either does.
+    pub leading_left: ForkShapes,
+    /// How forks share out what grows on from them.
+    pub sharing: Sharing,
     /// How far branches above the trunk turn from the direction away from the foot, to either side,
-    /// radians.
-    pub directions: VonMises,
-    /// Number of foot, forks and tips, and the level of the highest of them.
-    pub nodes: usize,
+    /// radians: those that lead on at a fork, and the others.
+    pub leading: VonMises,
+    pub others: VonMises,
+    /// Number of forks into two, and the largest number of them from the foot to a tip; a fork into
+    /// more counts as one less than it has branches.
+    pub forks: usize,
     pub deepest: u8,
     /// From the foot to the main fork, px in the picture.
     pub trunk_px: Vector2<f64>,
+    /// Usual length of the branches at the main fork, px in the picture: the trunk below may be much
+    /// longer or shorter than a stem is.
+    pub first_px: f64,
+}
+
+/// The distributions of angles and lengths of bifurcations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForkShapes {
+    pub angles: DirichletFit,
+    pub lengths: DirichletFit,
+}
+
+/// How the branches of a fork share the forks above it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sharing {
+    /// Of those of the leading and of the other branch as shares of their sum; `None` where no fork
+    /// of the example carries two.
+    pub shares: Option<Dirichlet>,
 }
 
 /// Why no tree can be grown.
@@ -74,36 +100,100 @@ impl ForkStatistics {
 
     /// Of a flat tree of forks and tips with the trunk's top there, px.
     fn of_tree(tree: &[Node2d], top_px: Point2<f64>) -> Result<Self, GrowError> {
-        let found = bifurcations(tree);
+        let forks = forks(tree);
+        let found: Vec<Bifurcation> = forks.iter().map(|fork| fork.shape).collect();
         let few = GrowError::TooFewForks { found: found.len() };
         if found.len() < FEWEST_FORKS {
             return Err(few);
         }
-        let (mut angles, mut lengths) = (Vec::new(), Vec::new());
-        for of_fork in found.iter().flat_map(|b| [*b, b.mirrored()]) {
-            angles.push(of_fork.angles.to_vec());
-            lengths.push(of_fork.lengths.to_vec());
-        }
-        let (Some(angles), Some(lengths)) = (fit(&angles), fit(&lengths)) else {
+        let mirrored = found.iter().map(|fork| fork.mirrored());
+        let alike = ForkShapes::of(found.iter().copied().chain(mirrored));
+        let led = ForkShapes::of(forks.iter().flat_map(Fork::leading_left));
+        let (Some(ForkShapes { angles, lengths }), Some(leading_left)) = (alike, led) else {
             return Err(few);
         };
+        let children = children(tree);
+        let carried = carried_forks(tree, &children);
+        let trunk = Trunk::of(tree, &children, top_px);
+        let [leading, others] = directions(tree, &children, &carried);
         Ok(Self {
             bifurcations: found,
             angles,
             lengths,
-            nodes: tree.len(),
-            deepest: tree.iter().map(|n| n.level).max().unwrap_or(0),
-            directions: directions(tree),
-            trunk_px: trunk(tree, top_px),
+            leading_left,
+            sharing: Sharing::of(&forks),
+            leading,
+            others,
+            forks: carried.first().copied().unwrap_or(0),
+            deepest: deepest(tree, &children),
+            trunk_px: trunk.to_fork_px,
+            first_px: trunk.first_px,
         })
     }
 
-    /// A bifurcation like those of the example.
+    /// Length of a stem whose fork has branches as long as those of the main fork, px.
+    fn first_stem_px(&self) -> f64 {
+        let mean = self.lengths.distribution.mean();
+        let stem = mean.first().copied().unwrap_or(1.0 / 3.0);
+        self.first_px * stem / (0.5 * (1.0 - stem)).max(f64::MIN_POSITIVE)
+    }
+
+    /// How natural it is that the leading branch of a fork and the other one turn so far from the
+    /// direction away from the foot, radians, as shares of what is most natural.
+    fn likelihoods(&self, [leading, other]: [f64; 2]) -> [f64; 2] {
+        [
+            self.leading.likelihood(leading),
+            self.others.likelihood(other),
+        ]
+    }
+
+    /// A bifurcation like those of the example, whose left branch leads on.
     pub fn sample(&self, random: &mut Generator) -> Bifurcation {
         Bifurcation {
-            angles: sampled(&self.angles.distribution, random),
-            lengths: sampled(&self.lengths.distribution, random),
+            angles: sampled(&self.leading_left.angles.distribution, random),
+            lengths: sampled(&self.leading_left.lengths.distribution, random),
         }
+    }
+}
+
+impl ForkShapes {
+    /// `None` of none.
+    fn of(forks: impl Iterator<Item = Bifurcation>) -> Option<Self> {
+        let (mut angles, mut lengths) = (Vec::new(), Vec::new());
+        for fork in forks {
+            angles.push(fork.angles.to_vec());
+            lengths.push(fork.lengths.to_vec());
+        }
+        Some(Self {
+            angles: fit(&angles)?,
+            lengths: fit(&lengths)?,
+        })
+    }
+}
+
+impl Sharing {
+    fn of(forks: &[Fork]) -> Self {
+        let mut shares = Vec::new();
+        for fork in forks {
+            let [left, right] = fork.carried;
+            let all = (left + right + 1) as f64;
+            if left + right > 1 {
+                // Half a fork more for each, as none of many is not none at all.
+                let leads = (left.max(right) as f64 + 0.5) / all;
+                shares.push(vec![leads, 1.0 - leads]);
+            }
+        }
+        Self {
+            shares: fit(&shares).map(|fit| fit.distribution),
+        }
+    }
+
+    /// How many of `forks` the leading branch gets.
+    fn leading_of(&self, forks: usize, random: &mut Generator) -> usize {
+        let drawn = self.shares.as_ref().map(|shares| shares.sample(random));
+        let share = drawn.and_then(|drawn| drawn.into_iter().reduce(f64::max));
+        let leads = (share.unwrap_or(0.5) * forks as f64).round() as usize;
+        leads.min(forks)
     }
 }
 
@@ -113,44 +203,83 @@ fn sampled(distribution: &Dirichlet, random: &mut Generator) -> [f64; 3] {
     std::array::from_fn(|k| drawn.get(k).copied().unwrap_or(0.0))
 }
 
-/// From the foot to the main fork: of those up to the trunk's top that are met with on the way
-/// along the branch that carries most, the one at which the second branch carries most, the lowest
-/// of equals; else to the top. Twigs that leave the trunk do not end it.
-fn trunk(tree: &[Node2d], top_px: Point2<f64>) -> Vector2<f64> {
-    let mut carried = vec![1_usize; tree.len()];
-    let mut children: Vec<Vec<usize>> = vec![Vec::new(); tree.len()];
-    for i in (1..tree.len()).rev() {
-        if let Some(parent) = tree[i].parent {
-            carried[parent] += carried[i];
-            children[parent].push(i);
-        }
-    }
-    let (mut most, mut end_px) = (0, top_px);
-    let mut at = (!tree.is_empty()).then_some(0);
-    while let Some(node) = at {
-        let own = &mut children[node];
-        own.sort_by_key(|child| std::cmp::Reverse((carried[*child], *child)));
-        let second = own.get(1).map_or(0, |child| carried[*child]);
-        let here = tree[node].position_px;
-        if node > 0 && second > most && here.y >= top_px.y - 1.0 {
-            (most, end_px) = (second, here);
-        }
-        at = own.first().copied();
-    }
-    tree.first()
-        .map_or_else(Vector2::zeros, |foot| end_px - foot.position_px)
+/// The trunk of a tree.
+struct Trunk {
+    /// From the foot to the main fork, px.
+    to_fork_px: Vector2<f64>,
+    /// Geometric mean of the lengths of the branches there, px.
+    first_px: f64,
 }
 
-/// The distribution of the angles between the direction from the foot and the branches above the
-/// first, and their mirror images.
-fn directions(tree: &[Node2d]) -> VonMises {
-    let mut angles = Vec::new();
-    for node in tree.iter().filter(|n| n.level > 1) {
-        let below = node.parent.map_or(node, |p| &tree[p]);
-        let angle = outward(tree[0].position_px, below.position_px, node.position_px);
-        angles.extend([angle, -angle]);
+impl Trunk {
+    /// Up to the main fork: of those up to the trunk's top that are met with on the way along the
+    /// branch that carries most, the one at which the second branch carries most, the lowest of
+    /// equals; else to the top. Twigs that leave the trunk do not end it.
+    fn of(tree: &[Node2d], children: &[Vec<usize>], top_px: Point2<f64>) -> Self {
+        let mut carried = vec![1_usize; tree.len()];
+        for i in (1..tree.len()).rev() {
+            if let Some(parent) = tree[i].parent {
+                carried[parent] += carried[i];
+            }
+        }
+        let (mut most, mut end_px, mut main_fork) = (0, top_px, None);
+        let mut at = (!tree.is_empty()).then_some(0);
+        while let Some(node) = at {
+            let mut own = children[node].clone();
+            own.sort_by_key(|child| std::cmp::Reverse((carried[*child], *child)));
+            let second = own.get(1).map_or(0, |child| carried[*child]);
+            let here = tree[node].position_px;
+            if node > 0 && second > most && here.y >= top_px.y - 1.0 {
+                (most, end_px, main_fork) = (second, here, Some(node));
+            }
+            at = own.first().copied();
+        }
+        let foot_px = tree.first().map_or(end_px, |foot| foot.position_px);
+        let to_fork_px = end_px - foot_px;
+        let branches = main_fork.map_or(&[][..], |node| &children[node]);
+        let lengths_px = branches
+            .iter()
+            .map(|child| (tree[*child].position_px - end_px).norm());
+        let ln_sum: f64 = lengths_px.map(|l| l.max(1.0).ln()).sum();
+        let first_px = match branches.len() {
+            0 => to_fork_px.norm(),
+            n => (ln_sum / n as f64).exp(),
+        };
+        Self {
+            to_fork_px,
+            first_px,
+        }
     }
-    VonMises::fit(&angles).unwrap_or(VonMises::new(0.0, 0.0))
+}
+
+/// The distributions of the angles between the direction from the foot and the branches above the
+/// first, and their mirror images: of those that carry more than all others of their fork, and of
+/// these.
+fn directions(tree: &[Node2d], children: &[Vec<usize>], carried: &[usize]) -> [VonMises; 2] {
+    let [mut leading, mut others] = [Vec::new(), Vec::new()];
+    for (i, node) in tree.iter().enumerate().filter(|(_, n)| n.level > 1) {
+        let below = node.parent.unwrap_or(i);
+        let mut beside = children[below].iter().filter(|child| **child != i);
+        let leads = beside.all(|child| carried[*child] < carried[i]);
+        let from_px = tree[below].position_px;
+        let angle = outward(tree[0].position_px, from_px, node.position_px);
+        let kind = if leads { &mut leading } else { &mut others };
+        kind.extend([angle, -angle]);
+    }
+    [leading, others].map(|angles| VonMises::fit(&angles).unwrap_or(VonMises::new(0.0, 0.0)))
+}
+
+/// Most forks into two from the foot to a tip.
+fn deepest(tree: &[Node2d], children: &[Vec<usize>]) -> u8 {
+    let mut levels = vec![0_u8; tree.len()];
+    for (i, node) in tree.iter().enumerate() {
+        if let Some(parent) = node.parent {
+            let forks = children[parent].len().saturating_sub(1);
+            let forks = u8::try_from(forks.max(1)).unwrap_or(u8::MAX);
+            levels[i] = levels[parent].saturating_add(forks);
+        }
+    }
+    levels.into_iter().max().unwrap_or(0)
 }
 
 /// Angle between the direction from the foot and that of a branch, clockwise, radians.
@@ -162,15 +291,19 @@ fn outward(foot_px: Point2<f64>, from_px: Point2<f64>, to_px: Point2<f64>) -> f6
 /// Grows a tree in `region`, from a foot at `foot_px`. `scale` is how much larger it is to be than
 /// the example. Of some trees that are grown the one that fills the region best (eq. 5) is taken.
 ///
-/// As many bifurcations are sampled as the example's number of nodes asks for, and each is put to
-/// use once, as it was sampled: so the forks of the tree have the distribution that was learned,
-/// whatever room there is. Of three random leaves that with the longest branch is the next apex,
-/// and its own branch the stem, which the lengths go by. Of some of the sampled bifurcations and
-/// their mirror images, which stand in as many directions, the most probable is taken (eq. 2): it
-/// brings the tree nearer to the places of the region (eq. 6), and its branches go away from the
-/// foot as the example's do. One that would leave the region is not taken. In place of those that
-/// fit nowhere others are sampled, three times. It ends when the bifurcations are used up, or none
-/// of them fits at any leaf, or every leaf is as deep as the example's deepest.
+/// As many bifurcations are sampled as the example has, and each is put to use once, as it was
+/// sampled: so the forks of the tree have the distribution that was learned, whatever room there is.
+/// They are shared out from the trunk up: of those that a branch is to carry one is its end, and the
+/// two branches there share the rest as those of the example do ([`Sharing`]). The branch with most
+/// to carry is the next stem, which the lengths go by. Of some of the sampled bifurcations and their
+/// mirror images, which stand in as many directions, the most probable is taken (eq. 2): it brings
+/// the tree nearer to the places of the region (eq. 6) with little wood, and its branches go away
+/// from the foot as the example's do. One that would leave the region is not taken, nor one that
+/// goes where hardly any of the example does. Those that fit nowhere are tried again at random tips,
+/// at last in any direction.
+///
+/// The paper grows at a random leaf. Then nothing says which branch becomes a limb, and limbs led
+/// back along the border of the region.
 ///
 /// The paper turns a bifurcation about the leaf into the direction that fills most and is natural.
 /// To turn it is to change two of its three angles: the forks would no longer be like the
@@ -203,11 +336,20 @@ fn grown<'a>(
     example: &ForkStatistics,
     random: &mut Generator,
 ) -> Growth<'a> {
-    let forks = example.nodes.saturating_sub(1) / 2;
-    for _ in 0..ROUNDS {
-        let missing = forks.saturating_sub(trunk.forks());
-        let unused = (0..missing).map(|_| example.sample(random)).collect();
-        trunk.round(unused, example.deepest, random);
+    let mut unused: Vec<Bifurcation> = Vec::with_capacity(example.forks);
+    unused.resize_with(example.forks, || example.sample(random));
+    let mut leaves = vec![Leaf {
+        node: 1,
+        forks: example.forks,
+    }];
+    for round in 1..=ROUNDS {
+        let least = if round < ROUNDS {
+            LEAST_LIKELIHOOD
+        } else {
+            0.0
+        };
+        trunk.round(leaves, &mut unused, least, example, random);
+        leaves = trunk.shared_out(unused.len(), random);
     }
     trunk
 }
@@ -217,9 +359,17 @@ fn grown<'a>(
 struct Growth<'a> {
     tree: Vec<Node2d>,
     space: GrowthSpace<'a>,
-    directions: VonMises,
+    /// Length that the first stem counts with, px.
+    first_stem_px: f64,
     shortest_px: f64,
     gain_floor_px: f64,
+}
+
+/// A tip that is to carry so many forks.
+#[derive(Clone, Copy, Debug)]
+struct Leaf {
+    node: usize,
+    forks: usize,
 }
 
 /// One way to go on from a leaf.
@@ -227,7 +377,10 @@ struct Growth<'a> {
 struct Way {
     /// Its place among those that are not used yet.
     bifurcation: usize,
+    /// Of the branch that leads on, and of the other.
     ends_px: [Point2<f64>; 2],
+    /// How natural its directions are, the less likely one as a share of the likeliest.
+    likelihood: f64,
     /// How probable it is, but for a factor that all have.
     weight: f64,
 }
@@ -251,112 +404,143 @@ impl<'a> Growth<'a> {
         if !is_near || top_px == foot_px {
             return Err(GrowError::OffTree);
         }
-        space.add(foot_px);
-        space.add(top_px);
+        space.add(foot_px, top_px);
         Ok(Self {
             tree: vec![new_node(None, 0, foot_px), new_node(Some(0), 1, top_px)],
             shortest_px: SHORTEST * space.height_px(),
             gain_floor_px: GAIN_FLOOR * space.width_px(),
+            first_stem_px: example.first_stem_px() * scale,
             space,
-            directions: example.directions,
         })
     }
 
-    /// Number of forks into two.
-    fn forks(&self) -> usize {
-        self.tree.len() / 2 - 1
-    }
-
-    /// Puts bifurcations to use at leaves below the level `deepest`, as long as there are some and
-    /// one of them fits.
-    fn round(&mut self, mut unused: Vec<Bifurcation>, deepest: u8, random: &mut Generator) {
-        let mut is_leaf = vec![true; self.tree.len()];
-        for parent in self.tree.iter().filter_map(|n| n.parent) {
-            is_leaf[parent] = false;
-        }
-        let mut leaves: Vec<usize> = (1..self.tree.len()).filter(|i| is_leaf[*i]).collect();
-        while !leaves.is_empty() && !unused.is_empty() {
-            let leaf = self.longest_of_some(&mut leaves, random);
-            if self.tree[leaf].level >= deepest {
-                continue;
+    /// Puts bifurcations to use at leaves less deep than the example's deepest, as far as they fit.
+    /// Those that fit nowhere are left.
+    fn round(
+        &mut self,
+        mut leaves: Vec<Leaf>,
+        unused: &mut Vec<Bifurcation>,
+        least_likelihood: f64,
+        example: &ForkStatistics,
+        random: &mut Generator,
+    ) {
+        while let Some(leaf) = take_fullest(&mut leaves) {
+            let mut ways = Vec::new();
+            if self.tree[leaf.node].level < example.deepest {
+                unused.shuffle(random);
+                let hand = HAND.min(unused.len());
+                ways = self.ways(leaf.node, &unused[..hand], 0, example);
+                ways.retain(|way| way.likelihood >= least_likelihood);
+                if ways.is_empty() {
+                    ways = self.ways(leaf.node, &unused[hand..], hand, example);
+                    ways.retain(|way| way.likelihood >= least_likelihood);
+                }
             }
-            unused.shuffle(random);
-            let hand = HAND.min(unused.len());
-            let mut ways = self.ways(leaf, &unused[..hand], 0);
-            if ways.is_empty() {
-                ways = self.ways(leaf, &unused[hand..], hand);
-            }
-            // Where nothing fits the leaf remains one.
-            if let Some(way) = best(ways) {
-                unused.swap_remove(way.bifurcation);
-                leaves.extend(self.fork(leaf, way));
-            }
-        }
-    }
-
-    /// Takes out of `leaves`, of which there is one at least, that with the longest branch of
-    /// [`LEAVES`] random ones.
-    fn longest_of_some(&self, leaves: &mut Vec<usize>, random: &mut Generator) -> usize {
-        let mut longest = random.random_range(0..leaves.len());
-        for _ in 1..LEAVES {
-            let other = random.random_range(0..leaves.len());
-            if self.length_px(leaves[other]) > self.length_px(leaves[longest]) {
-                longest = other;
+            let Some(way) = best(ways) else { continue };
+            unused.swap_remove(way.bifurcation);
+            let rest = leaf.forks - 1;
+            let leading = example.sharing.leading_of(rest, random);
+            let shares = [leading, rest - leading];
+            for (node, forks) in self.fork(leaf.node, way).into_iter().zip(shares) {
+                leaves.extend((forks > 0).then_some(Leaf { node, forks }));
             }
         }
-        leaves.swap_remove(longest)
     }
 
-    /// Length of the branch that ends in a node, px.
-    fn length_px(&self, node: usize) -> f64 {
-        let node = &self.tree[node];
-        let parent = node.parent.map_or(node, |p| &self.tree[p]);
-        (node.position_px - parent.position_px).norm()
+    /// So many forks, each at a random tip.
+    fn shared_out(&self, forks: usize, random: &mut Generator) -> Vec<Leaf> {
+        let children = children(&self.tree);
+        let tips: Vec<usize> = (1..self.tree.len())
+            .filter(|i| children[*i].is_empty())
+            .collect();
+        let mut carried = vec![0; self.tree.len()];
+        for _ in 0..forks {
+            carried[tips[random.random_range(0..tips.len())]] += 1;
+        }
+        let leaves = carried.into_iter().enumerate();
+        leaves
+            .filter(|(_, forks)| *forks > 0)
+            .map(|(node, forks)| Leaf { node, forks })
+            .collect()
     }
 
     /// All ways to go on from `leaf` with one of some bifurcations, of which the first is number
     /// `first`.
-    fn ways(&self, leaf: usize, bifurcations: &[Bifurcation], first: usize) -> Vec<Way> {
+    fn ways(
+        &self,
+        leaf: usize,
+        bifurcations: &[Bifurcation],
+        first: usize,
+        example: &ForkStatistics,
+    ) -> Vec<Way> {
         let mut ways = Vec::new();
         for (number, bifurcation) in (first..).zip(bifurcations) {
-            for mirrored in [*bifurcation, bifurcation.mirrored()] {
-                ways.extend(self.way(leaf, number, &mirrored));
+            for leads in 0..2 {
+                ways.extend(self.way(leaf, number, bifurcation, leads, example));
             }
         }
         ways
     }
 
+    /// With the left branch leading on, as it is (0), or with the right one, as its mirror image (1).
     /// `None` where it leaves the region, or has a branch that is too short.
-    fn way(&self, leaf: usize, number: usize, bifurcation: &Bifurcation) -> Option<Way> {
+    fn way(
+        &self,
+        leaf: usize,
+        number: usize,
+        bifurcation: &Bifurcation,
+        leads: usize,
+        example: &ForkStatistics,
+    ) -> Option<Way> {
+        let shape = if leads == 0 {
+            *bifurcation
+        } else {
+            bifurcation.mirrored()
+        };
         let apex = self.tree[leaf].position_px;
-        let below = self.tree[self.tree[leaf].parent?].position_px;
-        let ends_px = branches(bifurcation, apex, below);
+        let stem = self.tree[self.tree[leaf].parent?].position_px - apex;
+        let stem_px = if leaf == 1 {
+            self.first_stem_px
+        } else {
+            stem.norm()
+        };
+        let mut ends_px = branches(&shape, apex, stem.normalize() * stem_px);
         let fits = ends_px
             .iter()
             .all(|end| (end - apex).norm() >= self.shortest_px && self.space.holds(apex, *end));
         if !fits {
             return None;
         }
-        let gain_px = self.space.gain(ends_px[0], ends_px[1]) + self.gain_floor_px;
+        ends_px.rotate_left(leads);
         let foot_px = self.tree[0].position_px;
-        let densities = ends_px.map(|end| self.directions.density(outward(foot_px, apex, end)));
-        let likely = (densities[0] * densities[1]).max(f64::MIN_POSITIVE);
+        let directions = ends_px.map(|end| outward(foot_px, apex, end));
+        let [leading, other] = example.likelihoods(directions);
+        let gain_px = self.space.gain(apex, ends_px) + self.gain_floor_px;
+        let wood_px: f64 = ends_px.iter().map(|end| (end - apex).norm()).sum();
         Some(Way {
             bifurcation: number,
             ends_px,
-            weight: gain_px * likely,
+            likelihood: leading.min(other),
+            weight: gain_px / wood_px.sqrt() * leading * other,
         })
     }
 
-    /// Adds the two branches, and returns their places.
+    /// Adds the two branches, and returns their places: of that which leads on, and of the other.
     fn fork(&mut self, leaf: usize, way: Way) -> [usize; 2] {
         let level = self.tree[leaf].level.saturating_add(1);
+        let apex = self.tree[leaf].position_px;
         way.ends_px.map(|end| {
-            self.space.add(end);
+            self.space.add(apex, end);
             self.tree.push(new_node(Some(leaf), level, end));
             self.tree.len() - 1
         })
     }
+}
+
+/// Takes out the leaf that is to carry most, the last of equals.
+fn take_fullest(leaves: &mut Vec<Leaf>) -> Option<Leaf> {
+    let fullest = (0..leaves.len()).max_by_key(|k| leaves[*k].forks)?;
+    Some(leaves.remove(fullest))
 }
 
 fn new_node(parent: Option<usize>, level: u8, position_px: Point2<f64>) -> Node2d {
@@ -369,10 +553,10 @@ fn new_node(parent: Option<usize>, level: u8, position_px: Point2<f64>) -> Node2
     }
 }
 
-/// Where the branches of a fork at `apex` end, left and right, whose stem comes from `below`, px.
-fn branches(bifurcation: &Bifurcation, apex: Point2<f64>, below: Point2<f64>) -> [Point2<f64>; 2] {
-    let [stem, left, right] = bifurcation.lengths;
-    let down = (below - apex) / stem.max(f64::MIN_POSITIVE);
+/// Where the branches of a fork at `apex` end, left and right, with `stem` the way down its stem, px.
+fn branches(bifurcation: &Bifurcation, apex: Point2<f64>, stem: Vector2<f64>) -> [Point2<f64>; 2] {
+    let [stem_share, left, right] = bifurcation.lengths;
+    let down = stem / stem_share.max(f64::MIN_POSITIVE);
     let [to_left, between, _] = bifurcation.angles.map(|share| share * TAU);
     [
         apex + Rotation2::new(to_left) * down * left,
@@ -395,6 +579,7 @@ fn more_probable(first: Way, second: Way) -> Way {
 
 #[cfg(test)]
 mod tests {
+    use super::super::features::bifurcations;
     use super::*;
     use crate::model::Size;
     use crate::random::generator;
@@ -438,7 +623,8 @@ mod tests {
             };
             let below = tree[tree[leaf].parent.expect("a stem")].position_px;
             let level = tree[leaf].level + 1;
-            for end in branches(&fork, tree[leaf].position_px, below) {
+            let apex = tree[leaf].position_px;
+            for end in branches(&fork, apex, below - apex) {
                 leaves.push(tree.len());
                 tree.push(new_node(Some(leaf), level, end));
             }
@@ -458,7 +644,7 @@ mod tests {
             lengths: [0.5, 0.2, 0.3],
         };
         let (apex, below) = (Point2::new(3.0, 4.0), Point2::new(9.0, 12.0));
-        let ends = branches(&fork, apex, below);
+        let ends = branches(&fork, apex, below - apex);
         let tree = [
             new_node(None, 0, below),
             new_node(Some(0), 1, apex),

@@ -8,7 +8,7 @@ const PLACES: f64 = 240.0;
 /// Points along a branch that must lie in the region.
 const LOOKED_AT: u32 = 6;
 
-/// The region, and how far each of its places is from the nearest node.
+/// The region, and how far each of its places is from the nearest branch.
 #[derive(Clone)]
 pub(super) struct GrowthSpace<'a> {
     outline: &'a Outline,
@@ -67,27 +67,31 @@ impl<'a> GrowthSpace<'a> {
         nearest.map_or(at, |p| p.cast())
     }
 
-    /// Takes in a node of the tree.
-    pub fn add(&mut self, node: Point2<f64>) {
-        let node: Point2<f32> = node.cast();
-        for (place, nearest) in self.places.iter().zip(&mut self.nearest_px) {
-            *nearest = nearest.min((place - node).norm());
+    /// Takes in a branch of the tree, by its middle and its end.
+    pub fn add(&mut self, from: Point2<f64>, to: Point2<f64>) {
+        for node in [nalgebra::center(&from, &to), to] {
+            let node: Point2<f32> = node.cast();
+            for (place, nearest) in self.places.iter().zip(&mut self.nearest_px) {
+                *nearest = nearest.min((place - node).norm());
+            }
         }
     }
 
-    /// D: how far the places are from the nearest node, px in their mean.
+    /// D: how far the places are from the nearest branch, px in their mean.
     pub fn distance_px(&self) -> f64 {
         let sum: f32 = self.nearest_px.iter().sum();
         f64::from(sum) / self.places.len().max(1) as f64
     }
 
-    /// E: by how much two more nodes would bring the tree nearer to the places, px in their mean.
-    pub fn gain(&self, a: Point2<f64>, b: Point2<f64>) -> f64 {
-        let (a, b): (Point2<f32>, Point2<f32>) = (a.cast(), b.cast());
+    /// E: by how much two more branches would bring the tree nearer to the places, px in their mean.
+    pub fn gain(&self, apex: Point2<f64>, ends: [Point2<f64>; 2]) -> f64 {
+        let middles = ends.map(|end| nalgebra::center(&apex, &end));
+        let nodes: [Point2<f32>; 4] = [ends[0], ends[1], middles[0], middles[1]].map(|n| n.cast());
         let mut sum = 0.0_f32;
         for (place, nearest) in self.places.iter().zip(&self.nearest_px) {
-            let squared = (place - a).norm_squared().min((place - b).norm_squared());
-            sum += (nearest - squared.sqrt()).max(0.0);
+            let squared = nodes.map(|node| (place - node).norm_squared());
+            let least = squared.into_iter().fold(f32::INFINITY, f32::min);
+            sum += (nearest - least.sqrt()).max(0.0);
         }
         f64::from(sum) / self.places.len().max(1) as f64
     }

@@ -57,6 +57,11 @@ impl VonMises {
         (self.kappa * ((angle - self.mean).cos() - 1.0)).exp() / (TAU * self.scaled_i0)
     }
 
+    /// Density at an angle as a share of the highest.
+    pub fn likelihood(&self, angle: f64) -> f64 {
+        (self.kappa * ((angle - self.mean).cos() - 1.0)).exp()
+    }
+
     /// How far from the mean the density is above `threshold` (1/rad), radians: pi where it is
     /// everywhere.
     ///
