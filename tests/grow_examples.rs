@@ -271,6 +271,26 @@ fn the_motion_of_a_model_is_learned() {
     assert!(!in_wind.poses.is_empty());
 }
 
+/// What is read of the animation is what was filmed: the model's places leave those at rest as far as
+/// the capture's nodes do.
+#[test]
+fn the_animation_of_a_model_is_read_as_it_was_written() {
+    let path = replayed().join("tree.glb");
+    let model = read_model(&fs::read(&path).expect("file"), &path).expect("a model");
+    let film = Document::read(replayed(), 60.0).expect("a capture");
+    let heights = model.tree.nodes.iter().map(|n| n.position.y);
+    let height = heights.fold(0.0, f64::max);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for pose in &model.poses {
+        for (node, place) in model.tree.nodes.iter().zip(pose) {
+            sum += (place - node.position).norm_squared();
+            count += 1.0;
+        }
+    }
+    let ratio = (sum / f64::max(count, 1.0)).sqrt() / height / sway_px(&film);
+    assert!((0.8..1.25).contains(&ratio), "{ratio}");
+}
+
 /// How far the nodes are off their places, root of the mean square, as a share of the height.
 fn sway_px(tree: &Document) -> f64 {
     let nodes = &tree.skeleton.nodes;

@@ -16,6 +16,8 @@ use std::path::Path;
 /// The longest motion that is read, s, and its rate, Hz.
 const LONGEST_S: f64 = 60.0;
 const RATE_HZ: f64 = 30.0;
+/// Places whose motion is read: a minute of it is held in memory.
+const MOST_MOVING: usize = 8192;
 
 /// A modelled tree and its motion.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,6 +47,9 @@ pub(super) fn read(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError
     let ends = channels.iter().filter_map(|c| c.times_s.last().copied());
     let length_s = ends.fold(0.0, f64::max).min(LONGEST_S);
     let steps = (length_s * RATE_HZ) as usize;
+    if steps > 0 {
+        refuse_more("joints that move", tree.nodes.len(), MOST_MOVING)?;
+    }
     let mut poses = Vec::new();
     for step in 0..=steps {
         if steps == 0 {
@@ -301,4 +306,67 @@ fn largest_tree(parents: &[Option<usize>], order: &[usize]) -> Vec<usize> {
     of_largest
         .filter(|node| Some(roots[*node]) == largest)
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A trunk of 2 that forks into a limb to either side, whose joints begin at (-1, 3) and (1, 3)
+    /// and whose tips only the mesh shows: at (-2, 4, 0) and (1, 3, 2). Within 2 s the fork turns by
+    /// 90 degrees, the left limb at the end all at once, and the right one goes up by 1 in a curve.
+    fn fork() -> MovingModel {
+        let bytes = include_bytes!("../../fuzz/corpus/model/fork.glb");
+        read(bytes, Path::new("fork.glb")).expect("a model")
+    }
+
+    fn nearest(places: &[Point3<f64>], to: [f64; 3]) -> f64 {
+        let off = places.iter().map(|p| (p - Point3::from(to)).norm());
+        off.fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn joints_that_carry_none_end_where_their_mesh_does() {
+        let model = fork();
+        let places: Vec<Point3<f64>> = model.tree.nodes.iter().map(|n| n.position).collect();
+        assert_eq!(places.len(), 6);
+        for expected in [
+            [0.0, 0.0, 0.0],
+            [0.0, 2.0, 0.0],
+            [-1.0, 3.0, 0.0],
+            [1.0, 3.0, 0.0],
+            [-2.0, 4.0, 0.0],
+            [1.0, 3.0, 2.0],
+        ] {
+            assert!(
+                nearest(&places, expected) < 1e-6,
+                "{expected:?}: {places:?}"
+            );
+        }
+        assert_eq!(model.tree.metres_per_unit, 1.0);
+    }
+
+    /// The three ways between keys. A turn by 45 degrees about z brings (x, y) to
+    /// (x - y, x + y) / sqrt 2.
+    #[test]
+    fn joints_move_as_the_animation_says() {
+        let model = fork();
+        assert_eq!(model.poses.len(), 61);
+        let (half, h) = (&model.poses[30], 0.5_f64.sqrt());
+        for expected in [
+            [0.0, 2.0, 0.0],
+            [-2.0 * h, 2.0, 0.0],
+            // Not turned on its own yet.
+            [-4.0 * h, 2.0, 0.0],
+            // Half-way up, as the curve is even about its middle.
+            [(1.0 - 1.5) * h, 2.0 + 2.5 * h, 0.0],
+        ] {
+            assert!(nearest(half, expected) < 1e-6, "{expected:?}: {half:?}");
+        }
+        let last = &model.poses[60];
+        // Both turned by 90 degrees: from (-1, 1) to (-1, -1), and on to (1, -1) from there.
+        for expected in [[-1.0, 1.0, 0.0], [0.0, 0.0, 0.0], [-2.0, 3.0, 0.0]] {
+            assert!(nearest(last, expected) < 1e-6, "{expected:?}: {last:?}");
+        }
+    }
 }
