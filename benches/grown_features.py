@@ -175,4 +175,5 @@ def main():
           f"example and moved by {JITTER[-1]:.0%}: {apart(along_branches(places, parents), moved) / height:.3f}")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -6,6 +6,11 @@
     pictures.py sheet WOOD CAPTURE FRONT.png SIDE.png OUT.png
                                                film at rest, wood, traced branches, skeleton and model of one clip; WOOD is
                                                what `cargo bench --bench wood` writes
+    pictures.py drawing DRAWING.svg SIDE OUT.png
+                                               a drawing of docs/sketches (paths of M, Q and L, polylines, lines), SIDE px
+    pictures.py triangles EXAMPLE TREES OUT.png
+                                               the forks of an example and of the trees grown of it in the triangles of their
+                                               angles and lengths, with the fitted Dirichlet densities (needs numpy, scipy)
 """
 
 import csv
@@ -13,6 +18,7 @@ import json
 import math
 import re
 import sys
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 from PIL import Image, ImageDraw, ImageFont, ImageOps
@@ -231,8 +237,122 @@ def on_film(film, pieces):
     return large.resize(film.size, Image.LANCZOS)
 
 
+def drawing(svg, side, out):
+    """A square drawing; its trunk in orange, as in Li 2011 fig. 9."""
+    root = ElementTree.parse(svg).getroot()
+    scale = FINE * int(side) / float(root.get("width"))
+    picture = Image.new("RGB", (FINE * int(side),) * 2, "white")
+    draw = ImageDraw.Draw(picture)
+    draw_strokes(draw, root, scale, 1.0)
+    picture.resize((int(side),) * 2, Image.LANCZOS).save(out)
+
+
+def draw_strokes(draw, element, scale, width):
+    width = float(element.get("stroke-width", width))
+    line = stroke_of(element)
+    if line:
+        colour = (224, 128, 32) if element.get("id") == "trunk" else (96, 96, 96)
+        line = [(u * scale, v * scale) for u, v in line]
+        draw.line(line, fill=colour, width=max(1, round(width * scale)), joint="curve")
+    for child in element:
+        draw_strokes(draw, child, scale, width)
+
+
+def stroke_of(element):
+    """Points of a stroke; none of what is no stroke."""
+    tag = element.tag.split("}")[-1]
+    if tag == "line":
+        return [(float(element.get("x" + k)), float(element.get("y" + k))) for k in "12"]
+    if tag not in ("path", "polyline"):
+        return []
+    words = re.findall(r"[MLQ]|-?[\d.]+", element.get("d") or element.get("points"))
+    numbers = [float(word) for word in words if word not in "MLQ"]
+    places = list(zip(numbers[::2], numbers[1::2]))
+    if "Q" not in words:
+        return places
+    start, bend, end = places
+    shares = [k / 20 for k in range(21)]
+    on_curve = lambda t, k: (1 - t) ** 2 * start[k] + 2 * t * (1 - t) * bend[k] + t * t * end[k]
+    return [(on_curve(t, 0), on_curve(t, 1)) for t in shares]
+
+
+SIDE, EDGE = 340, 44  # of a triangle and around it, px
+
+
+def triangles(example, trees, out):
+    """Li 2011 fig. 8: rings the example's forks and their mirror images, dots those of the trees."""
+    sys.path.insert(0, str(Path(__file__).parent.parent / "benches"))
+    import grown_features as features
+    import numpy as np
+
+    ratios_of = lambda tree: features.ratios(*features.fork_tree(*features.nodes_of(Path(tree))))
+    own = ratios_of(example)
+    grown = np.concatenate([ratios_of(tree) for tree in sorted(Path(trees).iterdir())])
+    panels = []
+    for names, columns in ((("left", "between", "right"), (0, 1)), (("stem", "left", "right"), (2, 3))):
+        shares = [np.column_stack([r[:, columns[0]], r[:, columns[1]], 1 - r[:, columns].sum(1)]) for r in (own, grown)]
+        panels.append(triangle(*shares, names))
+    width, height = panels[0].size
+    picture = Image.new("RGB", (2 * width, height), "white")
+    for k, panel in enumerate(panels):
+        picture.paste(panel, (k * width, 0))
+    save(picture, out)
+
+
+def triangle(own, grown, names):
+    import numpy as np
+
+    fine = FINE * SIDE
+    high = int(fine * 3**0.5 / 2)
+    edge = FINE * EDGE
+    picture = Image.new("RGB", (fine + 2 * edge, high + 2 * edge), "white")
+    draw = ImageDraw.Draw(picture)
+    corners = np.array([(edge, edge + high), (edge + fine / 2, edge), (edge + fine, edge + high)])
+    # Log densities of the fit over the triangle; lines at shares of the highest.
+    alpha = dirichlet(np.clip(own, 1e-4, 1))
+    u, v = np.meshgrid(np.arange(picture.width), np.arange(picture.height))
+    top = (edge + high - v) / high
+    right = (u - edge) / fine - top / 2
+    places = np.stack([1 - top - right, top, right])
+    inside = places.min(0) > 1e-3
+    log = np.where(inside, ((alpha - 1)[:, None, None] * np.log(np.maximum(places, 1e-3))).sum(0), -np.inf)
+    levels = [0.9, 0.7, 0.5, 0.3, 0.1]
+    band = np.zeros(log.shape, int)
+    for share in levels:
+        band += log > log.max() + np.log(share)
+    shade = np.array([(255 - 16 * k, 255 - 10 * k, 255 - 3 * k) for k in range(len(levels) + 1)], np.uint8)
+    picture.paste(Image.fromarray(shade[band]), (0, 0), Image.fromarray(np.uint8(255 * inside)))
+    draw.polygon([tuple(c) for c in corners], outline=(90, 90, 90), width=2)
+    for rows, radius, colour, is_ring in ((grown, 2.0, (60, 110, 180), False), (own, 5.0, (200, 60, 30), True)):
+        for x, y in rows[:, [0, 1, 2]] @ corners[[0, 1, 2]]:
+            box = [x - radius, y - radius, x + radius, y + radius]
+            draw.ellipse(box, outline=colour, width=2) if is_ring else draw.ellipse(box, fill=colour)
+    font = ImageFont.truetype(str(FONTS / "DejaVuSans.ttf"), 13 * FINE)
+    draw.text((edge, edge + high + 8), names[0], fill=TEXT_DARK, font=font, anchor="mt")
+    draw.text((edge + fine / 2, edge - 8), names[1], fill=TEXT_DARK, font=font, anchor="ms")
+    draw.text((edge + fine, edge + high + 8), names[2], fill=TEXT_DARK, font=font, anchor="mt")
+    return picture.resize((picture.width // FINE, picture.height // FINE), Image.LANCZOS)
+
+
+TEXT_DARK = (40, 40, 40)
+
+
+def dirichlet(shares):
+    """Maximum likelihood, as src/grow/dirichlet.rs finds it."""
+    import numpy as np
+    from scipy.optimize import minimize
+    from scipy.special import gammaln
+
+    mean_log = np.log(shares).mean(0)
+    minus = lambda log: -(gammaln(np.exp(log).sum()) - gammaln(np.exp(log)).sum() + (np.exp(log) - 1) @ mean_log)
+    return np.exp(minimize(minus, np.log(10 * shares.mean(0))).x)
+
+
 if __name__ == "__main__":
-    commands = {"terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5)}
+    commands = {
+        "terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5), "drawing": (drawing, 3),
+        "triangles": (triangles, 3),
+    }
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:
         sys.exit(__doc__)

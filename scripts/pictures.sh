@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
-# without CLIPS the second is of a film made anew, for which PYTHON (python3) needs numpy, scipy and opencv.
+# wind, grown, sketch, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# clip) go to out/;
+# without CLIPS the second is of a film made anew, for which, and for `grown`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -125,26 +126,59 @@ shapes() {
     row "$to/topiary.png" "$work"/shaped-{triangle,circle,pentagon,heart,vase}.png
 }
 
-# A tree and new ones like it: of the same forks, and of the same branches at freer and freer angles.
+# grow NAME EXAMPLE OPTIONS...: trees like an example, which lies below $work too.
+grow() {
+    local name=$1 example=$2
+    shift 2
+    "$arborcam" grow "$work/$example" --motion none --out "$work/$name" "$@" 2>"$work/grow.log" ||
+        fail "grow of $example failed: $(tail -n 1 "$work/grow.log")"
+}
+
+# A tree and new ones like it: of the same forks, and of the same branches at freer and freer angles, and from lower and
+# lower levels on. The forks of both as points in triangles.
 grown() {
-    local threshold tree
+    local threshold level tree
     capture winter
-    "$arborcam" grow "$work/winter" --count 4 --motion none --out "$work/offspring" 2>"$work/grow.log" ||
-        fail "grow failed: $(tail -n 1 "$work/grow.log")"
+    grow offspring winter --count 4
     for threshold in 0.6 0.4 0.2; do
-        "$arborcam" grow "$work/winter" --count 1 --motion none --like von-mises --threshold "$threshold" \
-            --out "$work/turned-$threshold" 2>"$work/grow.log" || fail "grow failed: $(tail -n 1 "$work/grow.log")"
+        grow "turned-$threshold" winter --count 1 --like von-mises --threshold "$threshold"
     done
-    for tree in winter offspring/tree-000{1,2,3,4} turned-{0.6,0.4,0.2}/tree-0001; do
+    for level in 4 3 2; do
+        grow "from-$level" winter --count 1 --like von-mises --from-level "$level"
+    done
+    for tree in winter offspring/tree-000{1,2,3,4} turned-{0.6,0.4,0.2}/tree-0001 from-{4,3,2}/tree-0001; do
         render_made "$tree"
     done
     row "$to/grown.png" "$work"/made-winter.png "$work"/made-offspring-tree-000{1,2,3,4}.png
     row "$to/turned.png" "$work"/made-winter.png "$work"/made-turned-{0.6,0.4,0.2}-tree-0001.png
+    row "$to/turned-from.png" "$work"/made-winter.png "$work"/made-from-{4,3,2}-tree-0001.png
+    "$python" scripts/pictures.py triangles "$work/winter" "$work/offspring" "$to/triangles.png"
+    told "$to/triangles.png"
 }
 
-# Draws the tree in a folder below $work to made-NAME.png, slashes as dashes.
+# Two sketches, what becomes of them, and what is grown of the first.
+sketch() {
+    local name tree
+    for name in tree conifer; do
+        "$arborcam" sketch "docs/sketches/$name.svg" --out "$work/drawn-$name" 2>"$work/sketch.log" ||
+            fail "sketch of $name failed: $(tail -n 1 "$work/sketch.log")"
+        "$python" scripts/pictures.py drawing "docs/sketches/$name.svg" 288 "$work/drawing-$name.png"
+        render_made "drawn-$name"
+        render_made "drawn-$name" side
+    done
+    grow from-sketch drawn-tree --count 3
+    for tree in from-sketch/tree-000{1,2,3}; do
+        render_made "$tree"
+    done
+    row "$to/sketch.png" "$work/drawing-tree.png" "$work"/made-drawn-tree{,-side}.png \
+        "$work"/made-from-sketch-tree-000{1,2,3}.png
+    row "$to/sketch-conifer.png" "$work/drawing-conifer.png" "$work"/made-drawn-conifer{,-side}.png
+}
+
+# render_made NAME [VIEW]: draws the tree in a folder below $work to made-NAME[-VIEW].png, slashes as dashes.
 render_made() {
-    "$arborcam" render "$work/$1" --bare --size 256x288 --out "$work/made-${1//\//-}.png" 2>"$work/render.log" ||
+    "$arborcam" render "$work/$1" --bare --size 256x288 --view "${2:-front}" \
+        --out "$work/made-${1//\//-}${2:+-$2}.png" 2>"$work/render.log" ||
         fail "render of $1 failed: $(cat "$work/render.log")"
 }
 
@@ -249,6 +283,7 @@ wanted film && film_beside
 wanted shapes && shapes
 wanted wind && wind
 wanted grown && grown
+wanted sketch && sketch
 wanted points && points
 wanted terminal && terminal
 wanted page && page

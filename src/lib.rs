@@ -26,7 +26,8 @@
 //! · `track` points followed · [`hierarchy`] which points move together · `wood` which pixels are
 //! wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
 //! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
-//! motion that was not filmed · [`grow`] new trees like an example ·
+//! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches and
+//! modelled trees ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
 //! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
@@ -65,6 +66,7 @@ pub mod files;
 pub mod geometry;
 pub mod grow;
 pub mod hierarchy;
+pub mod import;
 pub mod model;
 pub mod motion;
 #[cfg(feature = "opencv")]

@@ -12,6 +12,7 @@ mod back;
 mod bark;
 #[cfg(feature = "camera")]
 mod decode;
+mod drawn;
 mod dress;
 mod film_log;
 #[cfg(feature = "opencv")]
@@ -31,6 +32,7 @@ mod wood;
 pub use back::{BackEnd, Followed, Moved};
 #[cfg(feature = "camera")]
 pub use decode::{DecodeStage, Undecoded};
+pub use drawn::stand_drawn;
 pub use dress::{dress, flutter};
 pub use film_log::{FilmLog, KeptFrame};
 #[cfg(feature = "opencv")]

@@ -44,6 +44,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "grow",
         &["model", "config", "signal", "skeleton::Node2d", "random"],
     ),
+    // Sketches and modelled trees become flat trees.
+    ("import", &["model", "signal", "files"]),
     // Sub-branches, which only their own frequency tells, and modes.
     (
         "solve",
@@ -125,7 +127,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "views",
         &[
             "model", "config", "files", "document", "export", "pipeline", "shape", "geometry",
-            "draw", "signal", "grow", "animate", "random",
+            "draw", "signal", "grow", "animate", "random", "import",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it; its table for statistics is
@@ -200,6 +202,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "animate",
             "draw",
             "grow",
+            "import",
             "report",
             "solve::Model",
             "solve::LEAST_MOVING",
@@ -223,8 +226,11 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("v4l::", &["source"]),
     ("nokhwa::", &["source"]),
     ("ratatui::", &["tui"]),
-    ("gltf::", &["export"]),
+    ("gltf::", &["export", "import"]),
     ("gltf_json::", &["export"]),
+    ("roxmltree::", &["import"]),
+    ("svgtypes::", &["import"]),
+    ("kurbo::", &["import"]),
     ("flate2::", &["export"]),
     ("base64::", &["export"]),
     ("opencv::", &["track", "outline", "wood"]),

@@ -5,6 +5,7 @@
 mod chance;
 
 use arborcam::config::Config;
+use arborcam::import::{FlatModel, joined, read_model, read_sketch};
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
 use chance::Chance;
@@ -123,4 +124,28 @@ fn no_text_brings_the_parsers_down() {
             let _ = arborcam::outline::parse(&text, "seed.json".into(), Size::new(64, 36));
         });
     }
+}
+
+#[test]
+fn no_drawing_and_no_model_brings_the_readers_down() {
+    let mut trees = 0;
+    for seed in seeds("drawing") {
+        each(&seed, |bytes| {
+            let tree = read_sketch(bytes).and_then(|sketch| joined(&sketch));
+            trees += usize::from(tree.is_ok());
+            assert!(tree.err().is_none_or(|e| !e.to_string().contains('\n')));
+        });
+    }
+    for seed in seeds("model") {
+        // As each kind of file.
+        for name in ["seed.glb", "seed.obj", "seed.ply", "seed.csv"] {
+            each(&seed, |bytes| {
+                let tree = read_model(bytes, Path::new(name))
+                    .and_then(|model| FlatModel::of(&model.tree, 3).map(|_| model));
+                trees += usize::from(tree.is_ok());
+                assert!(tree.err().is_none_or(|e| !e.to_string().contains('\n')));
+            });
+        }
+    }
+    assert!(trees > 30, "only {trees} trees: this shows nothing");
 }

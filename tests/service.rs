@@ -572,6 +572,8 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/analyze.md",
     "usr/share/doc/arborcam/dynamics.md",
     "usr/share/doc/arborcam/gallery.md",
+    "usr/share/doc/arborcam/grow.md",
+    "usr/share/doc/arborcam/sketch.md",
 ];
 
 fn make(goal: &str, root: &Path) {

@@ -1,7 +1,8 @@
-//! `arborcam grow EXAMPLE --count N --out DIR`: new trees like the tree of a capture.
+//! `arborcam grow EXAMPLE --count N --out DIR`: new trees like a captured, drawn or modelled one.
 
 use super::command_error::CommandError;
 use super::common::parse_within;
+use super::example::Example;
 use super::output::eprint_line;
 use super::shape::read_drawn;
 use super::stop::Stop;
@@ -21,7 +22,9 @@ const MOST_TREES: u64 = 100_000;
 
 #[derive(Debug, Args)]
 pub struct GrowArgs {
-    /// The example: the folder written by `capture` or `replay --out`, or by `grow`.
+    /// The example: the folder of a capture, of a sketch or of a grown tree, or a file: a drawing
+    /// (.svg, .json) or a modelled tree (.glb, .gltf; the lines of an .obj or .ply; .csv for
+    /// cylinders).
     example: PathBuf,
     /// Number of new trees.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_TREES))]
@@ -81,9 +84,7 @@ pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
     let likeness = args.likeness()?;
     refuse_taken(&args.out)?;
     let stop = Stop::on_signals()?;
-    let note = Document::note(&args.example)?;
-    let config = note.config.layered(args.config.as_deref(), |_| {})?;
-    let document = Document::read(&args.example, config.export.animation_s)?;
+    let Example { document, config } = Example::read(&args.example, args.config.as_deref())?;
     let motion = args.motion(&document);
     let region = args.region(&document)?;
     let options = OffspringOptions {
@@ -136,7 +137,7 @@ impl GrowArgs {
             Some(HowToMove::Example) => OffspringMotion::Example,
             Some(HowToMove::Wind) => OffspringMotion::Wind,
             Some(HowToMove::None) => OffspringMotion::AtRest,
-            None if document.has_motion() => OffspringMotion::Example,
+            None if document.has_motion() || !document.poses.is_empty() => OffspringMotion::Example,
             None => {
                 eprint_line(
                     "arborcam: note: the example has no motion, and the trees stand still; give \

@@ -8,6 +8,7 @@ mod command_error;
 mod common;
 mod devices;
 mod doctor;
+mod example;
 mod export;
 mod finish;
 mod grow;
@@ -25,6 +26,7 @@ mod scale;
 mod service;
 mod session;
 mod shape;
+mod sketch;
 mod stop;
 mod strokes;
 mod supervisor;
@@ -66,6 +68,8 @@ enum Command {
     Animate(animate::AnimateArgs),
     /// Grow new trees that look and move like the tree of a capture.
     Grow(grow::GrowArgs),
+    /// Make a tree of drawn strokes (.svg, .json).
+    Sketch(sketch::SketchArgs),
     /// Note species, site, wind and the like on a capture, or print what is noted on it.
     Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
@@ -99,6 +103,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Analyze(args) => analyze::run(args),
         Command::Animate(args) => animate::run(args),
         Command::Grow(args) => grow::run(args),
+        Command::Sketch(args) => sketch::run(args),
         Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),

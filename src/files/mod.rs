@@ -1,12 +1,14 @@
 //! Files and folders on the disk: what appears only when it is complete, and what is replaced at
 //! once.
 
+mod bounded;
 mod error;
 mod file;
 mod folder;
 mod place;
 mod replace;
 
+pub use bounded::read_bounded;
 pub use error::WriteError;
 pub use file::{OutputFile, write_files};
 pub use folder::OutputFolder;

@@ -93,3 +93,23 @@ pub fn in_one_piece(region: &Outline) -> Result<Outline, OutlineError> {
         .map_err(OutlineError::bad_polygon)?
         .ok_or_else(|| OutlineError::bad_polygon("it is empty"))
 }
+
+/// The region that polygons (px, in a picture of `size`) cover together, in one piece.
+///
+/// # Errors
+/// One of them is no outline, or there are none.
+pub fn covered(polygons_px: &[Vec<Point2<f64>>], size: Size) -> Result<Outline, OutlineError> {
+    let mut mask = vec![0; size.area()];
+    for polygon_px in polygons_px {
+        let part = polygon::outline(polygon_px, size)?;
+        for (pixel, own) in mask.iter_mut().zip(part.mask) {
+            *pixel |= own;
+        }
+    }
+    in_one_piece(&Outline {
+        size,
+        mask,
+        polygon_px: Vec::new(),
+        matte: None,
+    })
+}

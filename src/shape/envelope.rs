@@ -1,10 +1,10 @@
 //! The envelope: the outline turned about its axis (surface of revolution, Li 2011 sect. 3 after
 //! Okabe et al.), the hull of the skeleton turned (Zeng 2015 sect. 5.5), or a drawn shape.
 
-use super::hull::{convex_hull, crossed};
 use crate::bounds::Bounds;
 use crate::config::EnvelopeKind;
 use crate::model::Outline;
+use crate::signal::convex_hull;
 use nalgebra::{Point2, Point3};
 
 /// Farthest from the foot that a point of a hull is, px: there is a disc for every pixel of its
@@ -266,6 +266,31 @@ fn stretches(row: &[u8], foot_u: f64) -> Vec<Bounds> {
         open = m != 0;
     }
     out
+}
+
+/// Where the horizontal line at `y` enters and leaves a convex polygon; beyond its ends, as at its
+/// nearest corner.
+fn crossed(hull: &[Point2<f64>], y: f64) -> Bounds {
+    let mut crossings_x = Vec::with_capacity(2);
+    for (a, b) in hull.iter().zip(hull.iter().cycle().skip(1)) {
+        if !(a.y.min(b.y)..=a.y.max(b.y)).contains(&y) {
+            continue;
+        }
+        // Of a level side both corners; the second is the first of the next side.
+        let t = if a.y == b.y {
+            0.0
+        } else {
+            (y - a.y) / (b.y - a.y)
+        };
+        crossings_x.push(a.x + t * (b.x - a.x));
+    }
+    if let Some(ends) = Bounds::of(crossings_x) {
+        return ends;
+    }
+    let corner = hull
+        .iter()
+        .min_by(|a, b| (a.y - y).abs().total_cmp(&(b.y - y).abs()));
+    corner.map_or(Bounds::default(), |c| Bounds::new(c.x, c.x))
 }
 
 #[cfg(test)]

@@ -6,7 +6,6 @@ mod branching;
 mod curl;
 mod diener;
 mod envelope;
-mod hull;
 mod keep;
 mod limb;
 mod limbs;

@@ -4,8 +4,10 @@
 pub mod bfgs;
 pub mod extension;
 pub mod gram;
+mod hull;
 pub mod interpolation;
 pub mod least_squares;
+mod line;
 pub mod ln_product;
 mod local_affine;
 pub mod principal;
@@ -17,6 +19,8 @@ pub mod statistics;
 pub mod variable_projection;
 pub mod vectors;
 
+pub use hull::convex_hull;
+pub use line::corners;
 pub use local_affine::{Fit, Witness, local_affine};
 pub use principal::along_principal_direction;
 pub use segments::{distance_to_segment, segments_cross};

@@ -2,6 +2,7 @@
 //! view of a tree, be it at the end of a film or later, is written through [`PreparedTree`]; so a
 //! view says the same whenever it is made.
 
+mod drawn;
 mod error;
 mod loops;
 mod offspring;
@@ -10,6 +11,7 @@ mod studio;
 mod tables;
 mod write;
 
+pub use drawn::DrawnTree;
 pub use error::PrepareError;
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,

@@ -5,7 +5,7 @@
 use super::crossings::taken_apart;
 use super::mask::WoodMask;
 use crate::model::{BranchGraph, Size, WoodNode};
-use crate::signal::{distance_to_segment, median};
+use crate::signal::{corners, median};
 use nalgebra::Point2;
 use opencv::core::Mat;
 use opencv::imgproc::{
@@ -424,37 +424,14 @@ fn evened(grid: &Grid, track: &Track) -> Vec<Sample> {
 /// Which samples of a line are drawn: its ends, its `forks`, and as many others as it takes to
 /// follow it (Douglas and Peucker 1973).
 fn kept_samples(line: &[Sample], forks: &[usize]) -> Vec<usize> {
-    let last = line.len().saturating_sub(1);
-    let mut fixed: Vec<usize> = forks.iter().copied().chain([0, last]).collect();
-    fixed.sort_unstable();
-    fixed.dedup();
-    let mut kept = vec![0];
-    for pair in fixed.windows(2) {
-        keep_between(line, pair[0], pair[1], &mut kept);
-        kept.push(pair[1]);
-    }
-    kept
-}
-
-fn keep_between(line: &[Sample], from: usize, to: usize, kept: &mut Vec<usize>) {
-    let mut farthest: Option<usize> = None;
-    let mut most_px = STRAIGHT_PX;
-    for k in from + 1..to {
-        let off_px = distance_to_segment(line[k].at_px, line[from].at_px, line[to].at_px);
-        if off_px > most_px {
-            (farthest, most_px) = (Some(k), off_px);
-        }
-    }
-    if let Some(k) = farthest {
-        keep_between(line, from, k, kept);
-        kept.push(k);
-        keep_between(line, k, to, kept);
-    }
+    let places: Vec<Point2<f64>> = line.iter().map(|sample| sample.at_px).collect();
+    corners(&places, forks, STRAIGHT_PX)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::signal::distance_to_segment;
     use nalgebra::distance;
 
     const SIZE: Size = Size {

@@ -1,0 +1,114 @@
+//! Trees that are not captures: drawings and modelled trees, and all that `grow` takes as an example.
+
+use super::command_error::CommandError;
+use super::output::eprint_line;
+use crate::config::Config;
+use crate::document::Document;
+use crate::files::read_bounded;
+use crate::grow::FEWEST_FORKS;
+use crate::import::{FlatModel, FlatTree, ImportError, joined, read_model, read_sketch};
+use crate::outline;
+use crate::views::DrawnTree;
+use anyhow::{Context, anyhow};
+use std::path::Path;
+
+/// Largest drawing or model that is read, bytes.
+const LARGEST: u64 = 256_000_000;
+
+/// An example, and the settings for trees like it: its own, or others.
+pub struct Example {
+    pub document: Document,
+    pub config: Config,
+}
+
+impl Example {
+    /// Reads the folder of a tree, a drawing (`.svg`, `.json`), or a modelled tree. `settings` is a
+    /// configuration file.
+    ///
+    /// # Errors
+    /// It cannot be read or is no tree, or a setting is out of range.
+    pub fn read(path: &Path, settings: Option<&Path>) -> Result<Self, CommandError> {
+        if !path.is_file() {
+            let note = Document::note(path)?;
+            let config = note.config.layered(settings, |_| {})?;
+            let document = Document::read(path, config.export.animation_s)?;
+            return Ok(Self { document, config });
+        }
+        let config = Config::default().layered(settings, |_| {})?;
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        let mut document = if ["svg", "json"].map(Some).contains(&ending.to_str()) {
+            let flat = read_drawing(path)?;
+            stood_up(path, &flat, config)?.document(Vec::new())?
+        } else {
+            modelled(path, config)?
+        };
+        // It is in no folder, and the file holds no others.
+        document.dir = path.to_owned();
+        let config = document.note.config.clone();
+        Ok(Self { document, config })
+    }
+}
+
+/// The document of a modelled tree. Where those of its limbs that are to be copied have too few forks
+/// to learn from, all of them are taken, and not copied.
+fn modelled(path: &Path, mut config: Config) -> Result<Document, CommandError> {
+    let bytes = read_file(path)?;
+    let model = read_model(&bytes, path).map_err(|e| unfit(path, e))?;
+    let mut made_flat = FlatModel::of(&model.tree, config.shape.planes);
+    if made_flat
+        .as_ref()
+        .is_ok_and(|made| made.flat.forks() < FEWEST_FORKS)
+    {
+        config.shape.planes = 1;
+        made_flat = FlatModel::of(&model.tree, 1);
+    }
+    let made_flat = made_flat.map_err(|e| unfit(path, e))?;
+    config.export.metres_per_px = made_flat.metres_per_px;
+    let tree = stood_up(path, &made_flat.flat, config)?;
+    let mut poses = Vec::with_capacity(model.poses.len());
+    for (frame, places) in (0_u64..).zip(&model.poses) {
+        let time_s = frame as f64 * model.step_s;
+        poses.push(made_flat.pose(&tree.skeleton, &model.tree, places, frame, time_s));
+    }
+    Ok(tree.document(poses)?)
+}
+
+/// The flat tree in a drawing.
+///
+/// # Errors
+/// The file cannot be read, or gives no tree.
+pub fn read_drawing(path: &Path) -> Result<FlatTree, CommandError> {
+    let bytes = read_file(path)?;
+    let flat = read_sketch(&bytes).and_then(|sketch| joined(&sketch));
+    let flat = flat.map_err(|e| unfit(path, e))?;
+    if flat.trunk_px.is_empty() {
+        eprint_line(
+            "arborcam: note: no stroke is marked as the trunk, and the one with the lowest end is taken",
+        );
+    }
+    Ok(flat)
+}
+
+/// The tree of a file in space.
+///
+/// # Errors
+/// It encloses nothing, or has too many branches.
+pub fn stood_up(path: &Path, flat: &FlatTree, config: Config) -> Result<DrawnTree, CommandError> {
+    let region = outline::covered(&flat.cover_px(), flat.skeleton.image_size)
+        .with_context(|| path.display().to_string())
+        .map_err(CommandError::Failed)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    Ok(DrawnTree::new(name.into_owned(), flat, &region, config)?)
+}
+
+/// The bytes of a drawing or a model.
+fn read_file(path: &Path) -> Result<Vec<u8>, CommandError> {
+    read_bounded(path, LARGEST).map_err(|e| {
+        CommandError::NoInput(anyhow!("cannot read {}: {e}; give another", path.display()))
+    })
+}
+
+/// The error of a file that gives no tree.
+fn unfit(path: &Path, e: ImportError) -> CommandError {
+    CommandError::Failed(anyhow!("{}: {e}", path.display()))
+}

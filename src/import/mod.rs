@@ -1,0 +1,34 @@
+//! Trees that were not filmed, from the files of other programs: sketches and modelled trees.
+//!
+//! A sketch ([`read_sketch`]) is a set of strokes. Where they meet they are joined to a flat tree
+//! ([`joined`]), which is stood up in space as a captured one is (Li 2011 sect. 6 and fig. 9).
+//!
+//! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
+//! an OBJ, PLY or table of cylinders. It is made flat ([`FlatModel`]).
+
+mod cylinders;
+mod error;
+mod flat_tree;
+mod flatten;
+mod gltf_file;
+mod gltf_motion;
+mod gltf_skeleton;
+mod join;
+mod model_file;
+mod model_tree;
+mod obj;
+mod ply;
+mod sketch;
+mod sketch_json;
+mod svg;
+mod svg_path;
+mod svg_place;
+
+pub use error::ImportError;
+pub use flat_tree::FlatTree;
+pub use flatten::FlatModel;
+pub use gltf_skeleton::MovingModel;
+pub use join::joined;
+pub use model_file::read_model;
+pub use model_tree::{ModelNode, ModelTree};
+pub use sketch::{Sketch, Stroke, read_sketch};

@@ -1,0 +1,37 @@
+//! Which file holds what kind of a modelled tree.
+
+use super::error::ImportError;
+use super::gltf_skeleton::{self, MovingModel};
+use super::model_tree::ModelTree;
+use super::{cylinders, obj, ply};
+use std::path::Path;
+
+/// Reads a modelled tree in the `bytes` of the file at `path`, whose name says its format: `.glb` and
+/// `.gltf`, `.obj`, `.ply`, and `.csv` for a table of cylinders. Files that a glTF refers to are read
+/// from beside it.
+///
+/// # Errors
+/// It is of another format or damaged, or holds no skeleton that is a tree.
+pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError> {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    if bytes.iter().all(u8::is_ascii_whitespace) {
+        return Err(ImportError::bad_format("it is empty"));
+    }
+    let edges = match ending.to_str().unwrap_or_default() {
+        "glb" | "gltf" => return gltf_skeleton::read(bytes, path),
+        "obj" => obj::edges(&String::from_utf8_lossy(bytes))?,
+        "ply" => ply::edges(bytes)?,
+        "csv" => cylinders::edges(bytes)?,
+        _ => {
+            return Err(ImportError::unsupported(
+                "its name does not say what it is",
+                "give a folder of a tree, or .svg, .json, .glb, .gltf, .obj, .ply or .csv",
+            ));
+        }
+    };
+    Ok(MovingModel {
+        tree: ModelTree::of_edges(&edges)?,
+        poses: Vec::new(),
+        step_s: 0.0,
+    })
+}

@@ -1,0 +1,176 @@
+//! A modelled tree: places in space that are joined.
+
+use super::error::ImportError;
+use super::sketch::refuse_more;
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+
+/// Places of a model that are read.
+pub(super) const MOST_PLACES: usize = 1_000_000;
+
+/// A tree in space, y up, in the unit of its file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelTree {
+    /// Parents before children; the first is the foot.
+    pub nodes: Vec<ModelNode>,
+    /// Metres in the unit of the file; 0 where it is not known.
+    pub metres_per_unit: f64,
+}
+
+/// A place of a modelled tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModelNode {
+    pub parent: Option<usize>,
+    pub position: Point3<f64>,
+    /// Its place among those of the file.
+    pub place: usize,
+}
+
+/// What a file says: places, and which of them are joined.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Edges {
+    pub places: Vec<Point3<f64>>,
+    pub edges: Vec<[usize; 2]>,
+    /// The place of the foot where the file says so, else it is the lowest.
+    pub foot: Option<usize>,
+}
+
+impl ModelTree {
+    /// The tree of joined places, y up. Places that are the same are one. Places that are joined to
+    /// nothing do not count.
+    ///
+    /// # Errors
+    /// There is nothing joined, too much, or a place that is no number; the edges go round in a
+    /// circle, or are in several pieces.
+    pub(super) fn of_edges(file: &Edges) -> Result<Self, ImportError> {
+        refuse_more("places", file.places.len(), MOST_PLACES)?;
+        refuse_more("edges", file.edges.len(), MOST_PLACES)?;
+        if file.places.iter().any(|p| !p.iter().all(|x| x.is_finite())) {
+            return Err(ImportError::bad_format("a place in it is no number"));
+        }
+        let one = same_places(&file.places);
+        let mut neighbours: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for edge in &file.edges {
+            if edge.iter().any(|end| *end >= file.places.len()) {
+                let what = "an edge ends at a place that is not in it";
+                return Err(ImportError::bad_format(what));
+            }
+            let [a, b] = edge.map(|end| one[end]);
+            if a != b {
+                neighbours.entry(a).or_default().push(b);
+                neighbours.entry(b).or_default().push(a);
+            }
+        }
+        for ends in neighbours.values_mut() {
+            ends.sort_unstable();
+            ends.dedup();
+        }
+        let lowest = neighbours.keys().copied().min_by(|a, b| {
+            let [a, b] = [a, b].map(|place| file.places[*place].y);
+            a.total_cmp(&b)
+        });
+        let foot = file.foot.map(|foot| one[foot]).or(lowest);
+        let Some(foot) = foot.filter(|foot| neighbours.contains_key(foot)) else {
+            return Err(ImportError::NoSkeleton);
+        };
+        let nodes = from_foot(foot, &neighbours, &file.places)?;
+        if nodes.len() < neighbours.len() {
+            return Err(ImportError::InPieces {
+                joined: nodes.len(),
+                all: neighbours.len(),
+            });
+        }
+        Ok(Self {
+            nodes,
+            metres_per_unit: 0.0,
+        })
+    }
+}
+
+/// For each place the first one that is the same.
+fn same_places(places: &[Point3<f64>]) -> Vec<usize> {
+    let mut first: BTreeMap<[u64; 3], usize> = BTreeMap::new();
+    let mut same = Vec::with_capacity(places.len());
+    for (place, at) in places.iter().enumerate() {
+        // 0 and -0 are one place.
+        let key = [at.x, at.y, at.z].map(|x| (x + 0.0).to_bits());
+        same.push(*first.entry(key).or_insert(place));
+    }
+    same
+}
+
+/// All that is joined to the foot.
+fn from_foot(
+    foot: usize,
+    neighbours: &BTreeMap<usize, Vec<usize>>,
+    places: &[Point3<f64>],
+) -> Result<Vec<ModelNode>, ImportError> {
+    let mut nodes = vec![ModelNode {
+        parent: None,
+        position: places[foot],
+        place: foot,
+    }];
+    let mut is_known = vec![false; places.len()];
+    is_known[foot] = true;
+    let mut next = 0;
+    while let Some(ModelNode { parent, place, .. }) = nodes.get(next).copied() {
+        let below = parent.map(|p| nodes[p].place);
+        for end in neighbours.get(&place).into_iter().flatten().copied() {
+            if Some(end) == below {
+                continue;
+            }
+            if std::mem::replace(&mut is_known[end], true) {
+                return Err(ImportError::Cyclic);
+            }
+            nodes.push(ModelNode {
+                parent: Some(next),
+                position: places[end],
+                place: end,
+            });
+        }
+        next += 1;
+    }
+    Ok(nodes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(places: &[[f64; 3]], edges: &[[usize; 2]]) -> Result<ModelTree, ImportError> {
+        ModelTree::of_edges(&Edges {
+            places: places.iter().copied().map(Point3::from).collect(),
+            edges: edges.to_vec(),
+            foot: None,
+        })
+    }
+
+    const FORK: [[f64; 3]; 5] = [
+        [1.0, 3.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [-1.0, 3.0, 0.0],
+        [0.0, 1.0, -0.0],
+    ];
+
+    /// The fork is named twice, as files do that have each line for itself.
+    #[test]
+    fn a_tree_stands_on_its_lowest_place_and_what_is_the_same_is_one() {
+        let tree = of(&FORK, &[[2, 1], [4, 0], [1, 3], [3, 1]]).expect("a tree");
+        let parents: Vec<Option<usize>> = tree.nodes.iter().map(|n| n.parent).collect();
+        assert_eq!(parents, [None, Some(0), Some(1), Some(1)]);
+        assert_eq!(tree.nodes[0].place, 2);
+    }
+
+    #[test]
+    fn what_is_no_tree_is_refused() {
+        let circle = of(&FORK, &[[2, 1], [1, 0], [0, 3], [3, 1]]);
+        assert_eq!(circle, Err(ImportError::Cyclic));
+        let pieces = of(&FORK, &[[2, 1], [0, 3]]);
+        assert_eq!(pieces, Err(ImportError::InPieces { joined: 2, all: 4 }));
+        assert_eq!(of(&FORK, &[]), Err(ImportError::NoSkeleton));
+        assert_eq!(of(&FORK, &[[1, 4]]), Err(ImportError::NoSkeleton));
+        assert!(of(&FORK, &[[1, 77]]).is_err());
+        assert!(of(&[[0.0; 3], [f64::NAN, 1.0, 0.0]], &[[0, 1]]).is_err());
+    }
+}

@@ -1,0 +1,110 @@
+//! Documents of trees that were drawn, or modelled elsewhere.
+
+use super::{Draft, PrepareError, write_document};
+use crate::config::{Config, Leader};
+use crate::document::Document;
+use crate::document::note::{
+    CaptureNote, ModelNote, OutlineNote, Quality, SCHEMA_VERSION, Software, Source,
+};
+use crate::import::FlatTree;
+use crate::model::{Outline, Pose, Skeleton, Timing, UserNotes};
+use crate::pipeline::{MOST_RESHAPED, stand_drawn};
+use std::path::{Path, PathBuf};
+
+/// A tree that was not filmed, stood up in space.
+#[derive(Clone, Debug)]
+pub struct DrawnTree {
+    pub note: CaptureNote,
+    pub skeleton: Skeleton,
+}
+
+impl DrawnTree {
+    /// The tree `flat` within `region`. A trunk that is marked is neither copied nor pushed (Li 2011
+    /// sect. 6). `name` says where it is from.
+    ///
+    /// # Errors
+    /// It has too many branches.
+    pub fn new(
+        name: String,
+        flat: &FlatTree,
+        region: &Outline,
+        mut config: Config,
+    ) -> Result<Self, PrepareError> {
+        let nodes = flat.skeleton.nodes.len() * config.shape.planes as usize;
+        if nodes > MOST_RESHAPED {
+            return Err(PrepareError::TooManyNodes { nodes });
+        }
+        if !flat.trunk_px.is_empty() {
+            config.shape.leader = Leader::Drawn;
+            config.shape.leader_px = flat.trunk_px.iter().map(|p| [p.x, p.y]).collect();
+        }
+        let skeleton = stand_drawn(&flat.skeleton, flat.has_radii, region, &config);
+        let note = note(name, &skeleton, region, config);
+        Ok(Self { note, skeleton })
+    }
+
+    /// Writes it as a document to `dir`, which appears when it is complete.
+    ///
+    /// # Errors
+    /// `dir` is there already, or a file cannot be written.
+    pub fn write(self, dir: &Path) -> Result<PathBuf, PrepareError> {
+        let draft = Draft {
+            note: self.note,
+            skeleton: &self.skeleton,
+            picture: None,
+            bark: None,
+            at_rest: None,
+            poses: Vec::new(),
+            pose_in_picture: None,
+        };
+        write_document(dir, draft, &[])
+    }
+
+    /// The document that would be read back, with `poses` as its motion.
+    ///
+    /// # Errors
+    /// It cannot be read back, as it reaches too far.
+    pub fn document(&self, poses: Vec<Pose>) -> Result<Document, PrepareError> {
+        let mut document = Document::as_read(&self.note, &self.skeleton, &[], None)?;
+        document.poses = poses;
+        Ok(document)
+    }
+}
+
+/// What `capture.json` says of a tree that was not filmed.
+fn note(name: String, skeleton: &Skeleton, region: &Outline, config: Config) -> CaptureNote {
+    let polygon_px: Vec<[i32; 2]> = region.polygon_px.iter().map(|p| [p.x, p.y]).collect();
+    let size = region.size;
+    CaptureNote {
+        schema_version: SCHEMA_VERSION,
+        software: Software::default(),
+        captured_at: None,
+        notes: UserNotes::default(),
+        source: Source {
+            name,
+            width: size.width,
+            height: size.height,
+            ..Source::default()
+        },
+        timing: Timing::default(),
+        outline: Some(OutlineNote {
+            frame: 0,
+            width: size.width,
+            height: size.height,
+            rest_polygon_px: polygon_px.clone(),
+            polygon_px,
+        }),
+        picture: None,
+        bark: None,
+        masks: None,
+        build: None,
+        refinement: None,
+        quality: Quality::default(),
+        verdict: None,
+        judged_by: None,
+        model: Some(ModelNote::of(skeleton, config.export.metres_per_px)),
+        animation: None,
+        warnings: Vec::new(),
+        config,
+    }
+}
