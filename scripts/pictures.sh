@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
+# wind, grown, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each clip) go to out/;
 # without CLIPS the second is of a film made anew, for which PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
@@ -142,6 +142,18 @@ grown() {
     row "$to/turned.png" "$work"/made-winter.png "$work"/made-turned-{0.6,0.4,0.2}-tree-0001.png
 }
 
+# Forty trees of eight on a hill.
+forest() {
+    local tree=winter
+    [[ -n $clips ]] && tree=oak
+    capture "$tree"
+    "$arborcam" grow "$work/$tree" --count 40 --forest --motion none --height-map docs/shapes/hills.png \
+        --out "$work/forest" 2>"$work/grow.log" || fail "grow --forest failed: $(tail -n 1 "$work/grow.log")"
+    "$arborcam" render "$work/forest" --view turntable --size 800x330 --out "$work/forest.png" 2>"$work/render.log" ||
+        fail "render of the forest failed: $(cat "$work/render.log")"
+    row "$to/forest.png" "$work/forest.png"
+}
+
 # Draws the tree in a folder below $work to made-NAME.png, slashes as dashes.
 render_made() {
     "$arborcam" render "$work/$1" --bare --size 256x288 --out "$work/made-${1//\//-}.png" 2>"$work/render.log" ||
@@ -249,6 +261,7 @@ wanted film && film_beside
 wanted shapes && shapes
 wanted wind && wind
 wanted grown && grown
+wanted forest && forest
 wanted points && points
 wanted terminal && terminal
 wanted page && page

@@ -109,6 +109,7 @@ fn one_node() -> String {
         main_branch_rgb: arborcam::model::MAIN_BRANCH_RGB,
         branches: vec![branch],
         modes: Vec::new(),
+        forest: None,
     };
     let mut json =
         br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"tree","extras":{"node_id":0}}]}"#.to_vec();

@@ -10,6 +10,7 @@ mod devices;
 mod doctor;
 mod export;
 mod finish;
+mod forest;
 mod grow;
 mod hangup;
 mod line;

@@ -3,6 +3,8 @@
 //! view says the same whenever it is made.
 
 mod error;
+mod forest;
+mod forest_plan;
 mod loops;
 mod offspring;
 mod prepared;
@@ -11,6 +13,8 @@ mod tables;
 mod write;
 
 pub use error::PrepareError;
+pub use forest::PreparedForest;
+pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
 };
