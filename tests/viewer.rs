@@ -72,6 +72,14 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
         fs::write(dir.join(format!("page{suffix}.html")), text).expect("page");
     }
     fs::write(dir.join("page-one.html"), one_node()).expect("page");
+    let [grow, forest, page] = ["grow", "forest", "page-forest.html"].map(Path::new);
+    let forest = dir.join(forest);
+    arborcam(
+        &[grow, &capture, out, &forest],
+        &["--forest", "--count", "5", "--templates", "2"],
+    );
+    let html = Path::new("html");
+    arborcam(&[export, &forest, format, html, out, &dir.join(page)], &[]);
     fs::copy(outline, dir.join("outline.json")).expect("outline");
     fs::write(dir.join("title.txt"), TITLE).expect("title");
 }
