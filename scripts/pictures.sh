@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, sketch, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# wind, grown, sketch, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
 # clip) go to out/;
 # without CLIPS the second is of a film made anew, for which, and for `grown`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
@@ -175,6 +175,18 @@ sketch() {
     row "$to/sketch-conifer.png" "$work/drawing-conifer.png" "$work"/made-drawn-conifer{,-side}.png
 }
 
+# Forty trees of eight on a hill.
+forest() {
+    local tree=winter
+    [[ -n $clips ]] && tree=oak
+    capture "$tree"
+    "$arborcam" grow "$work/$tree" --count 40 --forest --motion none --height-map docs/shapes/hills.png \
+        --out "$work/forest" 2>"$work/grow.log" || fail "grow --forest failed: $(tail -n 1 "$work/grow.log")"
+    "$arborcam" render "$work/forest" --view turntable --size 800x330 --out "$work/forest.png" 2>"$work/render.log" ||
+        fail "render of the forest failed: $(cat "$work/render.log")"
+    row "$to/forest.png" "$work/forest.png"
+}
+
 # render_made NAME [VIEW]: draws the tree in a folder below $work to made-NAME[-VIEW].png, slashes as dashes.
 render_made() {
     "$arborcam" render "$work/$1" --bare --size 256x288 --view "${2:-front}" \
@@ -284,6 +296,7 @@ wanted shapes && shapes
 wanted wind && wind
 wanted grown && grown
 wanted sketch && sketch
+wanted forest && forest
 wanted points && points
 wanted terminal && terminal
 wanted page && page

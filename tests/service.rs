@@ -567,6 +567,8 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/service.md",
     "usr/share/doc/arborcam/settings.md",
     "usr/share/doc/arborcam/using.md",
+    "usr/share/doc/arborcam/grow.md",
+    "usr/share/doc/arborcam/forest.md",
     "usr/share/doc/arborcam/viewer.md",
     "usr/share/doc/arborcam/animate.md",
     "usr/share/doc/arborcam/analyze.md",

@@ -72,6 +72,14 @@ fn pages(dir: &Path, clip: &Path, outline: &Path) {
         fs::write(dir.join(format!("page{suffix}.html")), text).expect("page");
     }
     fs::write(dir.join("page-one.html"), one_node()).expect("page");
+    let [grow, forest, page] = ["grow", "forest", "page-forest.html"].map(Path::new);
+    let forest = dir.join(forest);
+    arborcam(
+        &[grow, &capture, out, &forest],
+        &["--forest", "--count", "5", "--templates", "2"],
+    );
+    let html = Path::new("html");
+    arborcam(&[export, &forest, format, html, out, &dir.join(page)], &[]);
     fs::copy(outline, dir.join("outline.json")).expect("outline");
     fs::write(dir.join("title.txt"), TITLE).expect("title");
 }
@@ -109,6 +117,7 @@ fn one_node() -> String {
         main_branch_rgb: arborcam::model::MAIN_BRANCH_RGB,
         branches: vec![branch],
         modes: Vec::new(),
+        forest: None,
     };
     let mut json =
         br#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],"nodes":[{"name":"tree","extras":{"node_id":0}}]}"#.to_vec();

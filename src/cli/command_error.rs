@@ -82,6 +82,7 @@ impl From<PrepareError> for CommandError {
             PrepareError::Document(e) => e.into(),
             PrepareError::Export(e) => e.into(),
             PrepareError::Shape(e) => Self::bad_usage(e),
+            PrepareError::Planting(e) => Self::bad_usage(e),
             PrepareError::NoPose { .. } | PrepareError::NotDense { .. } => Self::bad_usage(e),
             PrepareError::Grow(GrowError::NoSpace | GrowError::OffTree) => Self::bad_usage(e),
             e => Self::failed(e),

@@ -6,11 +6,12 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::tree::{Tail, TreeArgs, print_warnings};
 use super::unused;
+use crate::document::ForestDocument;
 use crate::export::gltf::{KEY_TOLERANCE_PX, LEVELS_OF_DETAIL, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
 use crate::files::{WriteError, refuse_taken, write_files};
-use crate::views::PreparedTree;
+use crate::views::{PreparedForest, PreparedTree};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::io::Write;
@@ -21,7 +22,8 @@ const STDOUT: &str = "-";
 
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// A capture: the folder written by `capture` or `replay --out`.
+    /// A capture: the folder written by `capture` or `replay --out`; or a forest made by `grow`
+    /// (html).
     dir: PathBuf,
     /// Format. glb: mesh and motion in one file; gltf: the same as .gltf and .bin; csv: a folder
     /// with the tables and the wood as cylinders; obj and ply: the tree at rest; html: a page for a
@@ -48,6 +50,22 @@ pub struct ExportArgs {
 }
 
 impl ExportArgs {
+    /// # Errors
+    /// Something is asked for that a forest does not have.
+    fn check_forest(&self) -> Result<(), CommandError> {
+        if self.format != Format::Html {
+            return bad_usage(
+                "of a forest only --format html is made; its GLB files lie in its folder, and its \
+                 trees are folders of their own"
+                    .into(),
+            );
+        }
+        if self.tree.is_given() || self.height.is_some() {
+            return bad_usage("the options of the tree do not go with a forest".into());
+        }
+        Ok(())
+    }
+
     /// Prints which options have no effect on this format.
     fn note_unused(&self) {
         if self.lods && !matches!(self.format, Format::Glb | Format::Gltf) {
@@ -96,6 +114,11 @@ pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
         html::built_in()?;
     }
     let stop = Stop::on_signals()?;
+    if ForestDocument::is_in(&args.dir) {
+        args.check_forest()?;
+        let page = PreparedForest::read(&args.dir)?.page(&target.stem())?;
+        return target.write(vec![(target.name(), page)], &stop);
+    }
     let mut tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
     print_warnings(&tree);
     args.note_unused();

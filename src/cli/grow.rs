@@ -1,8 +1,10 @@
-//! `arborcam grow EXAMPLE --count N --out DIR`: new trees like a captured, drawn or modelled one.
+//! `arborcam grow EXAMPLE --count N --out DIR`: new trees like a captured, drawn or modelled one,
+//! each on its own or all in one forest.
 
 use super::command_error::CommandError;
 use super::common::parse_within;
 use super::example::Example;
+use super::forest::{ForestArgs, write_forest};
 use super::output::eprint_line;
 use super::shape::read_drawn;
 use super::stop::Stop;
@@ -11,14 +13,19 @@ use crate::files::refuse_taken;
 use crate::grow::Resampling;
 use crate::model::Outline;
 use crate::outline;
-use crate::views::{Likeness, OffspringMotion, OffspringOptions, Parent, example_outline};
+use crate::runtime::{Undone, in_parallel};
+use crate::tui::CountBar;
+use crate::views::{
+    Likeness, OffspringMotion, OffspringOptions, Parent, PrepareError, example_outline,
+};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::AtomicBool;
 
 /// Most trees of one run.
 const MOST_TREES: u64 = 100_000;
+const MOST_THREADS: i64 = 256;
 
 #[derive(Debug, Args)]
 pub struct GrowArgs {
@@ -26,7 +33,7 @@ pub struct GrowArgs {
     /// (.svg, .json) or a modelled tree (.glb, .gltf; the lines of an .obj or .ply; .csv for
     /// cylinders).
     example: PathBuf,
-    /// Number of new trees.
+    /// Number of new trees; with --forest the number of trees in it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_TREES))]
     count: u64,
     /// Seed of the random numbers; the same seed gives the same trees.
@@ -52,6 +59,12 @@ pub struct GrowArgs {
     /// Settings that differ from those of the example (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
+    #[command(flatten)]
+    forest: ForestArgs,
+    /// Threads that trees are grown on; by default as many as there are processors. It changes no
+    /// tree.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=MOST_THREADS))]
+    threads: Option<u16>,
     /// Folder for the trees, one folder for each. It must not exist.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
@@ -94,20 +107,48 @@ pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
         config,
     };
     let parent = Parent::new(document, options)?;
+    let forest = args.forest.plan(&parent, args.count, args.seed)?;
     let is_stopped = stop.while_writing();
-    for number in 1..=args.count {
-        if is_stopped.load(Ordering::SeqCst) {
-            return Err(CommandError::Stopped);
-        }
-        let tree = parent.offspring(args.seed, number)?;
-        parent.write(&args.out.join(format!("tree-{number:04}")), tree)?;
-    }
-    let trees = if args.count == 1 { "tree" } else { "trees" };
-    eprint_line(&format!("{}: {} {trees}", args.out.display(), args.count));
-    Ok(())
+    let Some(forest) = forest else {
+        args.grow(&parent, args.count, is_stopped)?;
+        let trees = if args.count == 1 { "tree" } else { "trees" };
+        eprint_line(&format!("{}: {} {trees}", args.out.display(), args.count));
+        return Ok(());
+    };
+    args.grow(&parent, forest.origin.templates.len() as u64, is_stopped)?;
+    write_forest(forest, &args.out, is_stopped)
+}
+
+/// The folder of the new tree with this number.
+pub fn tree_name(number: u64) -> String {
+    format!("tree-{number:04}")
 }
 
 impl GrowArgs {
+    /// Grows and writes the new trees 1 to `count`.
+    fn grow(
+        &self,
+        parent: &Parent,
+        count: u64,
+        is_stopped: &AtomicBool,
+    ) -> Result<(), CommandError> {
+        let bar = CountBar::new(count, "trees");
+        let threads = match self.threads {
+            Some(threads) => usize::from(threads),
+            None => std::thread::available_parallelism().map_or(1, usize::from),
+        };
+        let grow_one = |number: u64| -> Result<(), PrepareError> {
+            let tree = parent.offspring(self.seed, number)?;
+            parent.write(&self.out.join(tree_name(number)), tree)?;
+            Ok(())
+        };
+        let grown = in_parallel(count, threads, is_stopped, &grow_one, &|done| bar.set(done));
+        grown.map_err(|undone| match undone {
+            Undone::Stopped => CommandError::Stopped,
+            Undone::Failed(e) => e.into(),
+        })
+    }
+
     /// # Errors
     /// An option does not go with what is asked for.
     fn likeness(&self) -> Result<Likeness, CommandError> {

@@ -11,6 +11,7 @@ mod doctor;
 mod example;
 mod export;
 mod finish;
+mod forest;
 mod grow;
 mod hangup;
 mod line;

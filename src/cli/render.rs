@@ -1,4 +1,4 @@
-//! `arborcam render DIR`: draws pictures and videos of a capture.
+//! `arborcam render DIR`: draws pictures and videos of a capture, and pictures of a forest.
 
 mod options;
 
@@ -7,8 +7,9 @@ pub use options::{Kind, RenderArgs, ViewName, WHITE, background, rate, size};
 use super::command_error::CommandError;
 use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
+use crate::document::ForestDocument;
 use crate::files::{OutputFile, WriteError, refuse_taken};
-use crate::views::{PrepareError, PreparedTree, Shot, Studio, VIDEO_S};
+use crate::views::{PrepareError, PreparedForest, PreparedTree, Shot, Studio, VIDEO_S};
 use anyhow::anyhow;
 use std::path::Path;
 
@@ -26,6 +27,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
     }
     refuse_taken(&args.out).map_err(write_error)?;
     let stop = Stop::on_signals()?;
+    if ForestDocument::is_in(&args.dir) {
+        args.check_forest(kind)
+            .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
+        let png = PreparedForest::read(&args.dir)?.picture(&args.shot())?;
+        return write_picture(&args.out, &png, &stop).map_err(write_error);
+    }
     let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
     if args.film.is_some() && tree.document.picture.is_none() {
         return Err(CommandError::Failed(anyhow!(

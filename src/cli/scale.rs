@@ -31,6 +31,11 @@ struct Known {
 }
 
 impl ScaleArgs {
+    /// Whether any option is given.
+    pub fn is_given(&self) -> bool {
+        self.metres_per_px.is_some() || self.scale.is_some()
+    }
+
     /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
         if let Some(metres) = self

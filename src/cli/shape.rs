@@ -27,6 +27,11 @@ pub struct ShapeArgs {
 }
 
 impl ShapeArgs {
+    /// Whether any option is given.
+    pub fn is_given(&self) -> bool {
+        self.trunk.is_some() || self.envelope.is_some()
+    }
+
     /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
         match &self.trunk {

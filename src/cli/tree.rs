@@ -85,6 +85,27 @@ impl Tail {
 }
 
 impl TreeArgs {
+    /// Whether any option is given.
+    pub fn is_given(&self) -> bool {
+        let Self {
+            config,
+            planes,
+            shape,
+            triangles,
+            leaves,
+            leaf,
+            leaf_swing,
+            density,
+            seed,
+            animation_s,
+            scale,
+        } = self;
+        let files = config.is_some() || leaf.is_some() || density.is_some();
+        let numbers = planes.is_some() || triangles.is_some() || seed.is_some();
+        let other = leaves.is_some() || *leaf_swing || animation_s.is_some();
+        files || numbers || other || shape.is_given() || scale.is_given()
+    }
+
     /// Applies the options of the command line.
     fn set(&self, config: &mut Config) {
         self.shape.set(config);

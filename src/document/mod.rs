@@ -5,13 +5,14 @@
 //! picture of it, `bark.png` its bark, `rest.png` the tree at rest, `wood.png` and `leaves.png` which
 //! of its pixels are wood and leaves. A tree that was filmed has `tracks.csv` and `left_out.csv`, the
 //! points, `motion.csv`, the poses, `camera.csv`, how the camera itself moved, and `modes.csv`, the
-//! modes of the whole tree.
+//! modes of the whole tree. A forest is a folder with the documents of its templates (`forest`).
 
 mod asked;
 mod at_rest;
 mod bark;
 mod camera;
 mod error;
+mod forest;
 mod modes;
 mod motion;
 mod nodes;
@@ -29,6 +30,10 @@ pub use at_rest::{LEAVES_MASK_FILE, REST_FILE, WOOD_MASK_FILE, at_rest_files};
 pub use bark::BARK_FILE;
 pub use camera::{CAMERA_FILE, CAMERA_HEADER, CameraCsv};
 pub use error::DocumentError;
+pub use forest::{
+    FOREST_FILE, FOREST_TREES_FILE, ForestDocument, ForestFileBytes, ForestNote, ForestOrigin,
+    GROUND_FILE, GroundNote, MOST_GROUND_SAMPLES,
+};
 pub use modes::{MODES_FILE, modes};
 pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};

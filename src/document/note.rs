@@ -44,6 +44,9 @@ pub struct CaptureNote {
     pub picture: Option<PictureNote>,
     /// `None` where no trunk was seen: the bark's colour is a guess then.
     pub bark: Option<BarkNote>,
+    /// `None` but for trees that were grown like one whose film shows its leaves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaves: Option<LeavesNote>,
     /// `None` where no wood was seen.
     pub masks: Option<MasksNote>,
     /// `None` if the capture ended before the tree was built.
@@ -90,6 +93,14 @@ pub struct Source {
     pub height: u32,
 }
 
+impl Source {
+    /// Its name without the folders that it lay in.
+    pub fn short_name(&self) -> &str {
+        let mut parts = self.name.rsplit(['/', '\\']);
+        parts.find(|part| !part.is_empty()).unwrap_or_default()
+    }
+}
+
 /// An outline file: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v], ...]}`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OutlineNote {
@@ -110,6 +121,13 @@ pub struct PictureNote {
     pub file: String,
     pub frame: u64,
     pub time_s: f64,
+}
+
+/// The colours of the leaves of the tree that this one was grown like.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeavesNote {
+    /// As the film shows them (sRGB), the darkest first.
+    pub rgb: Vec<[u8; 3]>,
 }
 
 /// The bark of the filmed trunk as a tile in the folder.
@@ -311,6 +329,11 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
+    /// Colours for leaves that no picture shows (sRGB); may be none.
+    pub fn leaf_rgb(&self) -> &[[u8; 3]] {
+        self.leaves.as_ref().map_or(&[], |leaves| &leaves.rgb)
+    }
+
     /// What the capture is worth by other answers on its sway, by node index, in a film that was
     /// found to be `cut`; `None` where it is not known what it was judged by.
     pub fn judgement_with(

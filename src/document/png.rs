@@ -23,6 +23,16 @@ pub fn grey_png(picture: &Luma) -> Result<Vec<u8>, WriteError> {
     encoded(&picture.pixels, picture.size, 1, ExtendedColorType::L8)
 }
 
+/// The same in grey of 16 bits a pixel, row by row.
+///
+/// # Errors
+/// The picture has no area, or other than one number a pixel.
+pub(super) fn grey16_png(size: Size, pixels: &[u16]) -> Result<Vec<u8>, WriteError> {
+    // The encoder takes them as the machine has them, and writes the high byte first.
+    let bytes: Vec<u8> = pixels.iter().flat_map(|x| x.to_ne_bytes()).collect();
+    encoded(&bytes, size, 2, ExtendedColorType::L16)
+}
+
 fn encoded(
     pixels: &[u8],
     size: Size,

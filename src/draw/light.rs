@@ -2,9 +2,9 @@
 
 use super::camera::{Camera, View};
 use super::canvas::{Canvas, Corner};
-use super::model::{Part, Posed};
+use super::model::{Part, Placed, Posed};
 use super::rgba::Rgba;
-use nalgebra::{Point2, Vector3};
+use nalgebra::{Matrix3, Point2, Rotation3, Vector3};
 
 /// How a picture is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,20 +34,65 @@ const SHADE: f32 = 0.4;
 
 /// Draws a tree in its pose; transparent where there is none.
 pub fn picture(tree: &Posed, camera: &Camera, look: &Look) -> Rgba {
+    let tree = [Placed::at_origin(tree)];
+    let picture = drawn(&tree, camera, look);
+    if !look.shadow || camera.view.down < 0.05 {
+        return picture;
+    }
+    let mut ground = shadow(&tree, camera);
+    ground.put(&picture);
+    ground
+}
+
+/// Draws trees on a ground; transparent where there is neither. A shadow lies on level ground at
+/// height 0, whatever the ground is like: it is for such ground only.
+pub fn scene(ground: &Posed, trees: &[Placed], camera: &Camera, look: &Look) -> Rgba {
+    let ground = [Placed::at_origin(ground)];
+    if !look.shadow || camera.view.down < 0.05 {
+        let all: Vec<Placed> = ground.iter().chain(trees).copied().collect();
+        return drawn(&all, camera, look);
+    }
+    let mut picture = drawn(&ground, camera, look);
+    picture.put(&shadow(trees, camera));
+    picture.put(&drawn(trees, camera, look));
+    picture
+}
+
+/// All of these without shadows, what is nearer before what is farther.
+fn drawn(all: &[Placed], camera: &Camera, look: &Look) -> Rgba {
     let samples = look.samples.clamp(1, 8);
     let mut canvas = Canvas::new(camera.size, samples);
     let mut eye = Eye::new(camera, samples);
     eye.thicker = (look.thicker_px / camera.scale) as f32;
-    tree.parts
-        .iter()
-        .for_each(|part| draw(part, &eye, &mut canvas));
-    let picture = canvas.picture();
-    if !look.shadow || camera.view.down < 0.05 {
-        return picture;
+    for placed in all {
+        let place = Place::of(placed);
+        for part in &placed.posed.parts {
+            draw(part, &place, &eye, &mut canvas);
+        }
     }
-    let mut ground = shadow(tree, camera);
-    ground.put(&picture);
-    ground
+    canvas.picture()
+}
+
+/// Where a tree stands, as the inner loop wants it.
+struct Place {
+    turn: Matrix3<f32>,
+    scale: f32,
+    foot: Vector3<f32>,
+}
+
+impl Place {
+    fn of(placed: &Placed) -> Self {
+        let turn = Rotation3::from_axis_angle(&Vector3::y_axis(), placed.turn_rad);
+        Self {
+            turn: turn.into_inner().cast(),
+            scale: placed.scale as f32,
+            foot: placed.foot.coords.cast(),
+        }
+    }
+
+    fn point(&self, p: Vector3<f32>) -> Vector3<f32> {
+        self.foot + self.turn * p * self.scale
+    }
 }
 
 /// A camera and its light as the inner loop wants them.
@@ -94,7 +139,7 @@ fn sun(view: View) -> Vector3<f32> {
     way.normalize().cast()
 }
 
-fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
+fn draw(part: &Part, place: &Place, eye: &Eye, canvas: &mut Canvas) {
     let towards = eye.axes[2];
     let parts = part
         .positions
@@ -103,14 +148,14 @@ fn draw(part: &Part, eye: &Eye, canvas: &mut Canvas) {
         .enumerate();
     let corners: Vec<Corner> = parts
         .map(|(i, (p, (n, colour)))| {
-            let mut normal = Vector3::from(*n);
+            let mut normal = place.turn * Vector3::from(*n);
             normal = normal.try_normalize(1e-6).unwrap_or(towards);
             if part.two_sided && normal.dot(&towards) < 0.0 {
                 normal = -normal;
             }
             let light = lit(normal, eye.sun, part.two_sided);
             let thicker = if part.two_sided { 0.0 } else { eye.thicker };
-            let [x, y, z] = eye.place(Vector3::from(*p) + normal * thicker);
+            let [x, y, z] = eye.place(place.point(Vector3::from(*p)) + normal * thicker);
             let uv = Point2::from(part.uvs.get(i).copied().unwrap_or_default());
             Corner {
                 x,
@@ -148,28 +193,31 @@ fn lit(normal: Vector3<f32>, sun: Vector3<f32>, leaf: bool) -> f32 {
     }
 }
 
-/// The shadow on the ground of the foot: grey with soft borders, transparent elsewhere.
-fn shadow(tree: &Posed, camera: &Camera) -> Rgba {
+/// The shadow on level ground at height 0: grey with soft borders, transparent elsewhere.
+fn shadow(trees: &[Placed], camera: &Camera) -> Rgba {
     let (sun, eye) = (Vector3::new(-0.3, 1.0, 0.15), Eye::new(camera, 1));
     let mut canvas = Canvas::new(camera.size, 1);
-    for part in &tree.parts {
-        let corners: Vec<Corner> = part
-            .positions
-            .iter()
-            .map(|p| {
-                let p = Vector3::from(*p);
-                let [x, y, _] = eye.place(p - sun * p.y.max(0.0));
-                Corner {
-                    x,
-                    y,
-                    z: 0.0,
-                    rgb: [0.0; 3],
-                    uv: Point2::origin(),
-                }
-            })
-            .collect();
-        for triangle in triangles(part, &corners) {
-            canvas.triangle(triangle, true, None);
+    for tree in trees {
+        let place = Place::of(tree);
+        for part in &tree.posed.parts {
+            let corners: Vec<Corner> = part
+                .positions
+                .iter()
+                .map(|p| {
+                    let p = place.point(Vector3::from(*p));
+                    let [x, y, _] = eye.place(p - sun * p.y.max(0.0));
+                    Corner {
+                        x,
+                        y,
+                        z: 0.0,
+                        rgb: [0.0; 3],
+                        uv: Point2::origin(),
+                    }
+                })
+                .collect();
+            for triangle in triangles(part, &corners) {
+                canvas.triangle(triangle, true, None);
+            }
         }
     }
     let mut picture = canvas.picture();

@@ -13,7 +13,7 @@ mod skin;
 mod texture;
 
 pub use camera::{BoundingCylinder, Camera, View};
-pub use light::{Look, picture};
-pub use model::{Model, Posed};
+pub use light::{Look, picture, scene};
+pub use model::{Model, Placed, Posed};
 pub use rgba::Rgba;
 pub use texture::Texture;

@@ -41,6 +41,30 @@ pub struct Posed<'a> {
     pub(super) parts: Vec<Part<'a>>,
 }
 
+/// A tree in its pose where it stands in a larger scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<'a> {
+    pub posed: &'a Posed<'a>,
+    /// Units of the scene.
+    pub foot: Point3<f64>,
+    /// About its axis, counter-clockwise seen from above, rad.
+    pub turn_rad: f64,
+    /// Units of the scene in one of the tree.
+    pub scale: f64,
+}
+
+impl<'a> Placed<'a> {
+    /// As it is in its own axes.
+    pub fn at_origin(posed: &'a Posed<'a>) -> Self {
+        Self {
+            posed,
+            foot: Point3::origin(),
+            turn_rad: 0.0,
+            scale: 1.0,
+        }
+    }
+}
+
 impl<'a> Model<'a> {
     /// Wood alone.
     pub fn bare(skeleton: &'a Skeleton, wood: &'a Mesh, bark_rgb: [u8; 3]) -> Self {
@@ -115,7 +139,21 @@ impl<'a> Model<'a> {
     }
 }
 
-impl Posed<'_> {
+impl<'a> Posed<'a> {
+    /// A mesh of one colour (sRGB) that no joints move.
+    pub fn of_mesh(mesh: &'a Mesh, rgb: [u8; 3]) -> Self {
+        let part = Part {
+            positions: mesh.positions.clone(),
+            normals: mesh.normals.clone(),
+            colours: vec![rgb; mesh.positions.len()],
+            uvs: &mesh.uvs,
+            indices: &mesh.indices,
+            texture: None,
+            two_sided: false,
+        };
+        Self { parts: vec![part] }
+    }
+
     /// What all of it lies in; `None` for nothing.
     pub fn bounds(&self) -> Option<BoundingCylinder> {
         let points = self.parts.iter().flat_map(|p| &p.positions);

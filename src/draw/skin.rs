@@ -19,7 +19,8 @@ impl Joints {
         let mut joints = vec![still; skeleton.nodes.len().max(1)];
         if let Some(pose) = pose {
             for (i, joint) in joints.iter_mut().enumerate() {
-                *joint = motion(skeleton, pose, i).unwrap_or(still);
+                let motion = pose.joint_motion(skeleton, i);
+                *joint = motion.map_or(still, |m| (m.turn.cast(), m.shift.cast()));
             }
         }
         Self(joints)
@@ -76,19 +77,6 @@ impl Joints {
         });
         moved.unzip()
     }
-}
-
-/// How joint `i` turns and shifts what hangs on it; `None` if it has no parent or a number is
-/// missing.
-fn motion(skeleton: &Skeleton, pose: &Pose, i: usize) -> Option<(Matrix3<f32>, Vector3<f32>)> {
-    let pivot = skeleton.nodes.get(i)?.parent?.index();
-    let rest = skeleton.nodes.get(pivot)?.position;
-    let now = pose.joints.get(pivot)?.position;
-    let rotation = pose.joints.get(i)?.rotation;
-    let turn = rotation.to_rotation_matrix().into_inner();
-    let shift = now.coords - turn * rest.coords;
-    let sound = turn.iter().chain(shift.iter()).all(|c| c.is_finite());
-    sound.then(|| (turn.cast::<f32>(), shift.cast::<f32>()))
 }
 
 /// Displacement of a vertex; none where there are fewer than vertices.

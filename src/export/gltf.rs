@@ -6,11 +6,11 @@ use super::gltf_animation::push_animation;
 use super::gltf_buffer::BufferBuilder;
 use super::gltf_check::check;
 use super::gltf_look::{LeafPicture, bark, leaf};
-use super::gltf_mesh::{Skinned, push_mesh, push_skin};
+use super::gltf_mesh::{MeshPart, push_skin, push_skinned};
 use super::gltf_model::raw;
 use super::joints::Moving;
 use crate::document::note::{AnimationNote, CaptureNote, Software};
-use crate::geometry::{Dressed, FoliageGroup, LEVELS, Mesh};
+use crate::geometry::{Dressed, Foliage, FoliageGroup, LEVELS, Mesh};
 use crate::model::{NodeId, Pose, TREE};
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
@@ -50,11 +50,19 @@ pub type NamedBytes = (String, Vec<u8>);
 /// numbers, if a pose belongs to another tree, or if there is more than the format can count.
 pub fn glb(model: &Model) -> Result<(Vec<u8>, AnimationNote), ExportError> {
     let Assembled {
-        mut root,
+        root,
         buffer,
         animation,
         ..
     } = assemble(model, false)?;
+    Ok((binary(root, buffer)?, animation))
+}
+
+/// The bytes of a GLB file.
+///
+/// # Errors
+/// It is larger than the format can count.
+pub(super) fn binary(mut root: Root, buffer: BufferBuilder) -> Result<Vec<u8>, ExportError> {
     let bin: Option<Cow<[u8]>> = buffer.finish(&mut root, None).map(Cow::Owned);
     let json: Cow<[u8]> = Cow::Owned(
         root.to_vec()
@@ -71,10 +79,9 @@ pub fn glb(model: &Model) -> Result<(Vec<u8>, AnimationNote), ExportError> {
         version: 2,
         length: 0,
     };
-    let bytes = gltf::binary::Glb { header, json, bin }
+    gltf::binary::Glb { header, json, bin }
         .to_vec()
-        .map_err(|e| ExportError::unfit(e.to_string()))?;
-    Ok((bytes, animation))
+        .map_err(|e| ExportError::unfit(e.to_string()))
 }
 
 /// The same as files beside each other: `STEM.gltf`, `STEM.bin`, and the texture of the leaves
@@ -125,11 +132,7 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
     let moving = Moving::new(model.skeleton, model.poses, model.tolerance_px);
     let mut root = Root::default();
     let mut buffer = BufferBuilder::default();
-    root.asset = Asset {
-        generator: Some(concat!("arborcam ", env!("CARGO_PKG_VERSION")).to_string()),
-        extras: raw(model.provenance)?,
-        ..Asset::default()
-    };
+    root.asset = asset(model.provenance)?;
     push_joints(&mut root, model)?;
     let look = Look::of(model);
     let mut drawn = Drawn::default();
@@ -154,7 +157,7 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         keys: moving.keys(),
         raw_keys: moving.raw_keys(),
     };
-    let texture = match leaf_picture(model, texture_apart) {
+    let texture = match leaf_picture(&model.dressed.foliage, texture_apart) {
         Some(picture) if texture_apart && look.has_leaves() => {
             Some((picture.ending()?, picture.texture.1.clone()))
         }
@@ -165,6 +168,15 @@ fn assemble(model: &Model, texture_apart: bool) -> Result<Assembled, ExportError
         buffer,
         animation,
         texture,
+    })
+}
+
+/// What the file says of itself.
+pub(super) fn asset(provenance: &Value) -> Result<Asset, ExportError> {
+    Ok(Asset {
+        generator: Some(concat!("arborcam ", env!("CARGO_PKG_VERSION")).to_string()),
+        extras: raw(provenance)?,
+        ..Asset::default()
     })
 }
 
@@ -231,8 +243,8 @@ fn push_wood(
     };
     let material = bark(root, buffer, &model.dressed.bark)?;
     let material = root.push(material);
-    let what = Skinned::wood(mesh, material, skin);
-    Ok(vec![push_mesh(root, buffer, model, what)?])
+    let what = MeshPart::wood(mesh, material, skin);
+    Ok(vec![push_skinned(root, buffer, model.scale(), what)?])
 }
 
 fn push_leaves(
@@ -247,26 +259,30 @@ fn push_leaves(
     if !look.has_leaves() {
         return Ok(());
     }
-    let material = leaf(root, buffer, leaf_picture(model, texture_apart))?;
+    let material = leaf(
+        root,
+        buffer,
+        leaf_picture(&model.dressed.foliage, texture_apart),
+    )?;
     for (k, group) in look.leaves.iter().enumerate() {
         if !is_drawn(&group.mesh) {
             continue;
         }
         let what = if look.swings {
             let branch = model.skeleton.name_of(group.node);
-            Skinned::swinging_leaves(group, material, skin, format!("leaves_{k}"), branch)
+            MeshPart::swinging_leaves(group, material, skin, format!("leaves_{k}"), branch)
         } else {
-            Skinned::leaves(group, material, skin)
+            MeshPart::leaves(group, material, skin)
         };
-        let node = push_mesh(root, buffer, model, what)?;
+        let node = push_skinned(root, buffer, model.scale(), what)?;
         drawn.meshes.push(node);
         drawn.swinging.extend(look.swings.then_some((k, node)));
     }
     Ok(())
 }
 
-fn leaf_picture<'a>(model: &Model<'a>, apart: bool) -> Option<LeafPicture<'a>> {
-    let foliage = &model.dressed.foliage;
+/// The picture of the leaf, where there is one.
+pub(super) fn leaf_picture(foliage: &Foliage, apart: bool) -> Option<LeafPicture<'_>> {
     let mut uvs = foliage.groups.iter().flat_map(|g| &g.mesh.uvs);
     Some(LeafPicture {
         texture: foliage.texture.as_ref()?,

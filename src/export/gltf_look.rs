@@ -4,7 +4,7 @@ use super::ExportError;
 use super::gltf_buffer::BufferBuilder;
 use super::gltf_model::raw;
 use crate::document::png;
-use crate::geometry::Bark;
+use crate::geometry::{Bark, GROUND_RGB};
 use gltf_json::image::MimeType;
 use gltf_json::material::{
     AlphaCutoff, AlphaMode, Material, PbrBaseColorFactor, PbrMetallicRoughness, StrengthFactor,
@@ -69,6 +69,21 @@ pub(super) fn bark(
         },
         ..Material::default()
     })
+}
+
+/// The ground of a forest.
+pub(super) fn ground() -> Material {
+    let [r, g, b] = GROUND_RGB.map(linear);
+    Material {
+        name: Some("ground".to_string()),
+        pbr_metallic_roughness: PbrMetallicRoughness {
+            base_color_factor: PbrBaseColorFactor([r, g, b, 1.0]),
+            metallic_factor: StrengthFactor(0.0),
+            roughness_factor: StrengthFactor(1.0),
+            ..PbrMetallicRoughness::default()
+        },
+        ..Material::default()
+    }
 }
 
 /// How the picture of a leaf goes into the file.

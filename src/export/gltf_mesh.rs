@@ -1,4 +1,4 @@
-//! Skinned meshes of a glTF file: wood and leaves.
+//! Meshes of a glTF file: wood and leaves.
 
 use super::ExportError;
 use super::gltf_buffer::{BufferBuilder, Layout, bounds, le_f32};
@@ -14,29 +14,60 @@ use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf_json::validation::Checked::{self, Valid};
 use gltf_json::{Accessor, Index, Node, Root, Skin};
 use serde_json::{Value, json};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// One mesh with its skin and looks.
-pub(super) struct Skinned<'a> {
+/// One mesh with its looks, and with its skin where joints move it.
+pub(super) struct MeshPart<'a> {
     mesh: &'a Mesh,
     /// Empty for one colour.
     colours: &'a [[u8; 3]],
     /// Displacements that the animation may add.
-    targets: Vec<&'a [[f32; 3]]>,
+    targets: Vec<Displacement<'a>>,
     material: Index<Material>,
-    skin: Index<Skin>,
-    name: String,
+    skin: Option<Index<Skin>>,
+    pub name: String,
     extras: Value,
 }
 
-impl<'a> Skinned<'a> {
+/// A displacement of every vertex that an animation adds by a weight.
+#[derive(Clone, Debug)]
+pub(super) struct Displacement<'a> {
+    pub name: String,
+    /// Model axes, px.
+    pub by: Cow<'a, [[f32; 3]]>,
+}
+
+impl<'a> Displacement<'a> {
+    fn of_leaves(name: &str, by: &'a [[f32; 3]]) -> Self {
+        Self {
+            name: name.to_owned(),
+            by: Cow::Borrowed(by),
+        }
+    }
+}
+
+impl<'a> MeshPart<'a> {
     pub fn wood(mesh: &'a Mesh, material: Index<Material>, skin: Index<Skin>) -> Self {
         Self {
+            skin: Some(skin),
+            ..Self::without_skin(mesh, &[], material, Vec::new())
+        }
+    }
+
+    /// A mesh that no joints move.
+    pub fn without_skin(
+        mesh: &'a Mesh,
+        colours: &'a [[u8; 3]],
+        material: Index<Material>,
+        targets: Vec<Displacement<'a>>,
+    ) -> Self {
+        Self {
             mesh,
-            colours: &[],
-            targets: Vec::new(),
+            colours,
+            targets,
             material,
-            skin,
+            skin: None,
             name: "wood".to_owned(),
             extras: Value::Null,
         }
@@ -59,44 +90,83 @@ impl<'a> Skinned<'a> {
         name: String,
         branch: Option<NodeName>,
     ) -> Self {
-        let targets = vec![&group.sine[..], &group.cosine[..]];
-        let extras = json!({ "node": branch.map(|b| b.0) });
+        let targets = vec![
+            Displacement::of_leaves("sine", &group.sine),
+            Displacement::of_leaves("cosine", &group.cosine),
+        ];
         Self {
-            mesh: &group.mesh,
-            colours: &group.colours,
             targets,
-            material,
-            skin,
             name,
-            extras,
+            extras: json!({ "node": branch.map(|b| b.0) }),
+            ..Self::leaves(group, material, skin)
         }
     }
 }
 
 /// Adds the mesh and the node that shows it.
-pub(super) fn push_mesh(
+pub(super) fn push_skinned(
     root: &mut Root,
     buffer: &mut BufferBuilder,
-    model: &Model,
-    what: Skinned,
+    scale: f64,
+    what: MeshPart,
 ) -> Result<Index<Node>, ExportError> {
-    let attributes = push_vertices(root, buffer, model, &what);
+    let mesh = mesh_of(root, buffer, scale, std::slice::from_ref(&what))?;
+    let mesh = root.push(mesh);
+    let extras = raw(&what.extras)?;
+    Ok(root.push(Node {
+        mesh: Some(mesh),
+        skin: what.skin,
+        name: Some(what.name),
+        extras,
+        ..Node::default()
+    }))
+}
+
+/// A mesh of these parts, named like the first, lengths times `scale`; its numbers are added. All
+/// parts must have the same number of displacements.
+pub(super) fn mesh_of(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    scale: f64,
+    parts: &[MeshPart],
+) -> Result<gltf_json::Mesh, ExportError> {
+    let mut primitives = Vec::with_capacity(parts.len());
+    for part in parts {
+        primitives.push(push_primitive(root, buffer, scale, part));
+    }
+    let targets = parts.first().map_or(&[][..], |part| &part.targets);
+    let names = if targets.is_empty() {
+        Value::Null
+    } else {
+        let names: Vec<&str> = targets.iter().map(|t| t.name.as_str()).collect();
+        json!({ "targetNames": names })
+    };
+    Ok(gltf_json::Mesh {
+        extensions: None,
+        extras: raw(&names)?,
+        name: parts.first().map(|part| part.name.clone()),
+        primitives,
+        weights: (!targets.is_empty()).then(|| vec![0.0; targets.len()]),
+    })
+}
+
+fn push_primitive(
+    root: &mut Root,
+    buffer: &mut BufferBuilder,
+    scale: f64,
+    what: &MeshPart,
+) -> Primitive {
+    let attributes = push_vertices(root, buffer, scale, what);
     let mut targets = Vec::with_capacity(what.targets.len());
-    for by in &what.targets {
+    for target in &what.targets {
         targets.push(MorphTarget {
-            positions: Some(push_places(root, buffer, by, model.scale())),
+            positions: Some(push_places(root, buffer, &target.by, scale)),
             normals: None,
             tangents: None,
         });
     }
     let indices = push_indices(root, buffer, what.mesh);
-    let at_rest = vec![0.0; targets.len()];
-    let names = if targets.is_empty() {
-        Value::Null
-    } else {
-        json!({"targetNames": ["sine", "cosine"]})
-    };
-    let primitive = Primitive {
+    Primitive {
         attributes,
         extensions: None,
         extras: None,
@@ -104,55 +174,41 @@ pub(super) fn push_mesh(
         material: Some(what.material),
         mode: Valid(Mode::Triangles),
         targets: (!targets.is_empty()).then_some(targets),
-    };
-    let mesh = root.push(gltf_json::Mesh {
-        extensions: None,
-        extras: raw(&names)?,
-        name: Some(what.name.clone()),
-        primitives: vec![primitive],
-        weights: (!at_rest.is_empty()).then_some(at_rest),
-    });
-    let extras = raw(&what.extras)?;
-    Ok(root.push(Node {
-        mesh: Some(mesh),
-        skin: Some(what.skin),
-        name: Some(what.name),
-        extras,
-        ..Node::default()
-    }))
+    }
 }
 
 /// What every vertex has.
 type Attributes = BTreeMap<Checked<Semantic>, Index<Accessor>>;
 
-/// Adds places, normals, texture coordinates, colours, joints and weights, in this order.
+/// Adds places, normals, texture coordinates and colours where there are any, and with a skin joints
+/// and weights, in this order.
 fn push_vertices(
     root: &mut Root,
     buffer: &mut BufferBuilder,
-    model: &Model,
-    what: &Skinned,
+    scale: f64,
+    what: &MeshPart,
 ) -> Attributes {
     let mesh = what.mesh;
     let (n, vertices) = (mesh.positions.len(), Some(ArrayBuffer));
     let mut attributes = Attributes::new();
-    let position = push_places(root, buffer, &mesh.positions, model.scale());
+    let position = push_places(root, buffer, &mesh.positions, scale);
     attributes.insert(Valid(Semantic::Positions), position);
     let normals: Vec<[f32; 3]> = mesh.normals.iter().map(unit).collect();
     let normal = buffer.accessor(root, Layout::f32(Type::Vec3), n, le_f32(&normals), vertices);
     attributes.insert(Valid(Semantic::Normals), normal);
-    let uv = buffer.accessor(
-        root,
-        Layout::f32(Type::Vec2),
-        n,
-        le_f32(&mesh.uvs),
-        vertices,
-    );
-    attributes.insert(Valid(Semantic::TexCoords(0)), uv);
+    if !mesh.uvs.is_empty() {
+        let layout = Layout::f32(Type::Vec2);
+        let uv = buffer.accessor(root, layout, n, le_f32(&mesh.uvs), vertices);
+        attributes.insert(Valid(Semantic::TexCoords(0)), uv);
+    }
     if !what.colours.is_empty() {
         let bytes = what.colours.iter().flat_map(|c| le_linear(*c));
         let layout = Layout::normalized(ComponentType::U16, Type::Vec4);
         let colours = buffer.accessor(root, layout, n, bytes, vertices);
         attributes.insert(Valid(Semantic::Colors(0)), colours);
+    }
+    if what.skin.is_none() {
+        return attributes;
     }
     let Skinning { joints, weights } = skinning(mesh);
     let (size, bytes) = joints.le_bytes();

@@ -3,7 +3,7 @@
 //! The page's code lies in `src/export/viewer/` and is put into the program by `build.rs`; here the
 //! tree is put into it.
 
-pub use super::html_data::{Branch, Data, Sways};
+pub use super::html_data::{Branch, Data, ForestFacts, Sways};
 
 use super::ExportError;
 use crate::document::jpeg;
@@ -162,6 +162,7 @@ mod tests {
             main_branch_rgb: crate::model::MAIN_BRANCH_RGB,
             branches: Vec::new(),
             modes: Vec::new(),
+            forest: None,
         }
     }
 

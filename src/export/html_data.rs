@@ -1,6 +1,7 @@
 //! What the HTML page knows of the tree apart from its model.
 
 use crate::document::CaptureNote;
+use crate::document::note::Software;
 use crate::dynamics::angle_to_parent_deg;
 use crate::model::{
     BotanicalBranches, LocalTime, MAIN_BRANCH_RGB, ModeSummary, NodeId, Participation, Pose,
@@ -39,6 +40,15 @@ pub struct Data {
     pub branches: Vec<Branch>,
     /// The modes of the whole tree, the slowest first.
     pub modes: Vec<ModeSummary>,
+    /// Of a forest, which has no branches here; `None` for a tree.
+    pub forest: Option<ForestFacts>,
+}
+
+/// What the page says of a forest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ForestFacts {
+    pub trees: u64,
+    pub templates: u64,
 }
 
 /// How a tree sways.
@@ -97,14 +107,8 @@ impl Data {
             .map(|p| p.time_s)
             .find(|t| t.is_finite())
             .unwrap_or(0.0);
-        let source = capture
-            .source
-            .name
-            .rsplit(['/', '\\'])
-            .find(|part| !part.is_empty())
-            .unwrap_or_default();
         Self {
-            source: source.to_owned(),
+            source: capture.source.short_name().to_owned(),
             software: format!("{} {}", capture.software.name, capture.software.version),
             captured_at: capture.captured_at,
             notes: capture.notes.clone(),
@@ -124,6 +128,28 @@ impl Data {
             main_branch_rgb: MAIN_BRANCH_RGB,
             branches: branches(skeleton, poses, sway),
             modes: ModeSummary::all(sway.modes, skeleton),
+            forest: None,
+        }
+    }
+
+    /// The facts of a forest whose templates were grown from `example`.
+    pub fn of_forest(example: &str, software: &Software, facts: ForestFacts) -> Self {
+        Self {
+            source: example.to_owned(),
+            software: format!("{} {}", software.name, software.version),
+            captured_at: None,
+            notes: UserNotes::default(),
+            metres_per_px: 1.0,
+            image: [0, 0],
+            foot_px: [0.0; 2],
+            outline_px: Vec::new(),
+            picture_time_s: None,
+            start_s: 0.0,
+            times_s: Vec::new(),
+            main_branch_rgb: MAIN_BRANCH_RGB,
+            branches: Vec::new(),
+            modes: Vec::new(),
+            forest: Some(facts),
         }
     }
 }

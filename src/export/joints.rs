@@ -188,7 +188,7 @@ fn written(node: usize, keys: &[Key], times_s: &[f64]) -> Keys {
 
 /// Places of the poses whose time grows, also as `f32`, which is what the file holds; and their
 /// times from the first on.
-fn usable(poses: &[Pose]) -> (Vec<usize>, Vec<f64>) {
+pub(super) fn usable(poses: &[Pose]) -> (Vec<usize>, Vec<f64>) {
     let start = poses
         .iter()
         .map(|p| p.time_s)

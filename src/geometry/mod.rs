@@ -5,6 +5,7 @@ mod chain;
 mod cylinders;
 mod dressed;
 mod foliage;
+mod ground;
 mod leaves;
 mod mesh;
 mod tube;
@@ -13,9 +14,10 @@ mod wood;
 pub use cylinders::{Cylinder, cylinders_by_branch};
 pub use dressed::{Bark, BarkSource, Dressed};
 pub use foliage::{Foliage, FoliageGroup};
+pub use ground::{GROUND_RGB, ground};
 pub use leaves::{
     LeafColours, LeafView, Sampling, Season, Template, TemplateFault, TemplateMesh, density_match,
-    foliage, foliage_by, leaf_cover, season, within_leaves,
+    foliage, foliage_by, leaf_cover, leaf_palette, season, within_leaves,
 };
 pub use mesh::Mesh;
 pub use wood::{LEVELS, bare_wood, wood, wood_levels};

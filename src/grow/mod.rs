@@ -7,13 +7,16 @@
 //! them ([`grow_flat`]). Zeng's way: the angles between the example's branches are learned as von
 //! Mises distributions ([`SideAngles`]) and drawn anew ([`resample`]).
 //!
-//! How the branches sway is learned from their spectra ([`MotionStatistics`]).
+//! How the branches sway is learned from their spectra ([`MotionStatistics`]). Where the trees of a
+//! forest stand is drawn by [`Planting`].
 
 mod dirichlet;
 mod features;
 mod flat_tree;
+mod forest;
 mod fork_tree;
 mod motion;
+mod poisson_disc;
 mod resample;
 mod space;
 mod von_mises;
@@ -21,6 +24,7 @@ mod von_mises;
 pub use dirichlet::{Basis, Dirichlet, DirichletFit, FEWEST_SAMPLES, fit};
 pub use features::{Bifurcation, bifurcations};
 pub use flat_tree::{FEWEST_FORKS, ForkStatistics, GrowError, grow_flat};
+pub use forest::{Planting, PlantingError};
 pub use fork_tree::fork_tree;
 pub use motion::{LOOP_S, MotionStatistics, sample_sway};
 pub use resample::{Resampling, SideAngles, resample};

@@ -10,6 +10,7 @@ mod camera_motion;
 mod capture_facts;
 mod control;
 mod foot;
+mod forest;
 mod frame;
 mod hierarchy;
 mod leaf_swing;
@@ -42,6 +43,7 @@ pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use foot::{Foot, FootBasis, TrunkRow};
+pub use forest::{Forest, ForestTree, Ground};
 pub use frame::{
     Frame, Luma, Picture, PixelFormat, RawFrame, Rgb, Size, TimedFrame, brightness, nanoseconds,
     seconds,
@@ -55,7 +57,7 @@ pub use moving_branch::MovingBranch;
 pub use origin::Origin;
 pub use outline::{Outline, bounds_px};
 pub use participation::{Participation, moves_with, participation, reason};
-pub use pose::{JointPose, Pose};
+pub use pose::{JointMotion, JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot, StillNeeded};
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};

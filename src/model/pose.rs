@@ -1,6 +1,7 @@
 //! The tree's posture in one frame.
 
-use nalgebra::{Point3, UnitQuaternion};
+use super::Skeleton;
+use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
 /// Where one node is, and how the branch that ends in it has turned.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,4 +31,28 @@ pub struct Pose {
     pub frame: u64,
     pub time_s: f64,
     pub joints: Vec<JointPose>,
+}
+
+/// How a joint moves what hangs on it: a point `p` goes to `turn p + shift`. Model axes, px.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointMotion {
+    pub turn: Matrix3<f64>,
+    pub shift: Vector3<f64>,
+}
+
+impl Pose {
+    /// How joint `i` moves what hangs on it: it turns about its parent node by the rotation of its
+    /// branch, as the joints of the model's file do. `None` if it has no parent or a number is
+    /// missing.
+    pub fn joint_motion(&self, skeleton: &Skeleton, i: usize) -> Option<JointMotion> {
+        let pivot = skeleton.nodes.get(i)?.parent?.index();
+        let rest = skeleton.nodes.get(pivot)?.position;
+        let now = self.joints.get(pivot)?.position;
+        let rotation = self.joints.get(i)?.rotation;
+        let turn = rotation.to_rotation_matrix().into_inner();
+        let shift = now.coords - turn * rest.coords;
+        let mut numbers = turn.iter().chain(shift.iter());
+        let sound = numbers.all(|x| x.is_finite());
+        sound.then_some(JointMotion { turn, shift })
+    }
 }

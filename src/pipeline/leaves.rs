@@ -114,6 +114,7 @@ impl InLeaf {
             pose,
             density: self.density.as_ref(),
             colours: self.colours(seen),
+            palette: seen.leaf_rgb,
             seeds: &self.seeds,
         }
     }

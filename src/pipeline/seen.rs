@@ -18,6 +18,8 @@ pub struct Seen<'a> {
     pub cut_to: Option<&'a Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`](crate::model::Wood).
     pub bark: Option<&'a Arc<Rgb>>,
+    /// Colours of leaves (sRGB) where the picture shows none; may be empty.
+    pub leaf_rgb: &'a [[u8; 3]],
     /// A leaf of the user's own, and a drawn density of the leaves, which goes before the
     /// picture's.
     pub leaf: Option<&'a Template>,

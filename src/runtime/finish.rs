@@ -386,6 +386,7 @@ pub(super) fn describe(
             frame: p.frame,
             time_s: p.time_s,
         }),
+        leaves: None,
         bark: tree.and_then(bark_of).map(|_| BarkNote {
             file: BARK_FILE.into(),
         }),

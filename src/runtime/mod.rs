@@ -24,6 +24,7 @@ mod losses;
 mod meter;
 mod model_thread;
 mod nap;
+mod parallel;
 mod play;
 mod pulse;
 mod rate;
@@ -46,6 +47,7 @@ mod watched;
 
 pub use finish::Written;
 pub use job::{Job, Summary};
+pub use parallel::{Undone, in_parallel};
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};

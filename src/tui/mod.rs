@@ -8,6 +8,7 @@
 mod abilities;
 mod awaited;
 mod compose;
+mod count_bar;
 mod drawing;
 mod format;
 mod graphics;
@@ -31,6 +32,7 @@ mod tty;
 mod wood;
 
 pub use abilities::{Abilities, abilities, columns};
+pub use count_bar::CountBar;
 pub use graphics::Preview;
 pub use moving::{AnimationCommand, Moving, watch};
 pub use opened::{Options, TuiError};

@@ -14,14 +14,8 @@ pub struct Progress {
 impl Progress {
     /// Nothing is shown before the first [`update`](Self::update).
     pub fn new() -> Self {
-        let shown = std::io::stderr().is_terminal();
-        let target = if shown {
-            ProgressDrawTarget::stderr_with_hz(10)
-        } else {
-            ProgressDrawTarget::hidden()
-        };
         Self {
-            bar: ProgressBar::with_draw_target(None, target).with_style(style(false)),
+            bar: ProgressBar::with_draw_target(None, standard_error()).with_style(style(false)),
         }
     }
 
@@ -53,6 +47,15 @@ impl Progress {
 impl Default for Progress {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// Where bars are drawn: standard error, and nowhere where that is no terminal.
+pub(super) fn standard_error() -> ProgressDrawTarget {
+    if std::io::stderr().is_terminal() {
+        ProgressDrawTarget::stderr_with_hz(10)
+    } else {
+        ProgressDrawTarget::hidden()
     }
 }
 

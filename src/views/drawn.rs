@@ -96,6 +96,7 @@ fn note(name: String, skeleton: &Skeleton, region: &Outline, config: Config) -> 
         }),
         picture: None,
         bark: None,
+        leaves: None,
         masks: None,
         build: None,
         refinement: None,

@@ -3,7 +3,7 @@
 use crate::document::DocumentError;
 use crate::export::ExportError;
 use crate::files::WriteError;
-use crate::grow::GrowError;
+use crate::grow::{GrowError, PlantingError};
 use crate::pipeline::MOST_RESHAPED;
 use crate::shape::TopiaryError;
 use std::path::PathBuf;
@@ -38,6 +38,9 @@ pub enum PrepareError {
         "the film of {} shows no motion that could be learned; give --motion wind or none", .dir.display()
     )]
     NoSway { dir: PathBuf },
+    /// A forest has no room, or its plot is too large.
+    #[error(transparent)]
+    Planting(#[from] PlantingError),
     /// The drawn shape is none for this tree.
     #[error(transparent)]
     Shape(#[from] TopiaryError),

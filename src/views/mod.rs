@@ -4,6 +4,8 @@
 
 mod drawn;
 mod error;
+mod forest;
+mod forest_plan;
 mod loops;
 mod offspring;
 mod prepared;
@@ -13,6 +15,8 @@ mod write;
 
 pub use drawn::DrawnTree;
 pub use error::PrepareError;
+pub use forest::PreparedForest;
+pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
 };

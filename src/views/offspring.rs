@@ -3,13 +3,16 @@
 use super::{Draft, PrepareError, PreparedTree, TreeOptions, write_document};
 use crate::animate::{Animator, Known, Wind, wind_scale};
 use crate::config::{self, Config, EnvelopeKind, Leader, LeafShow};
-use crate::document::note::{BarkNote, CaptureNote, ModelNote, OutlineNote, Quality, Source};
+use crate::document::note::{
+    BarkNote, CaptureNote, LeavesNote, ModelNote, OutlineNote, Quality, Source,
+};
 use crate::document::{BARK_FILE, Document};
+use crate::geometry::{Foliage, Template, leaf_palette};
 use crate::grow::{
     ForkStatistics, LOOP_S, MotionStatistics, Resampling, SideAngles, grow_flat, resample,
     sample_sway,
 };
-use crate::model::{Outline, Pose, Skeleton, Swaying, Timing, Unidentified};
+use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Timing, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
 use std::path::{Path, PathBuf};
@@ -54,6 +57,8 @@ pub struct Parent {
     form: Form,
     motion: Motion,
     region: Outline,
+    /// Colours of the example's leaves (sRGB); none where nothing shows them.
+    leaf_rgb: Vec<[u8; 3]>,
     /// How much larger than the example new trees are.
     scale: f64,
     config: Config,
@@ -118,19 +123,43 @@ impl Parent {
             OffspringMotion::AtRest => Motion::AtRest,
         };
         let scale = height_px(&region) / height_px(&own).max(1.0);
-        let (document, in_leaf) = looked_at(document)?;
+        let (document, foliage) = looked_at(document)?;
+        let in_leaf = !foliage.groups.is_empty();
         if config.leaves.show == LeafShow::Auto {
             // No picture shows theirs.
             config.leaves.show = if in_leaf { LeafShow::On } else { LeafShow::Off };
         }
+        let leaf_rgb = match document.picture {
+            Some(_) => leaf_palette(&foliage, &Template::ours()),
+            None => document.note.leaf_rgb().to_vec(),
+        };
         Ok(Self {
             document,
             form,
             motion,
             region,
+            leaf_rgb,
             scale,
             config,
         })
+    }
+
+    /// Metres in a pixel of new trees; 0 where that is not known.
+    pub fn metres_per_px(&self) -> f64 {
+        self.document.metres_per_px()
+    }
+
+    /// Width and height of the region that new trees fill, px.
+    pub fn size_px(&self) -> Size {
+        let bounds = self.region.bounds_px();
+        bounds.map_or(Size::new(1, 1), |[left, top, right, bottom]| {
+            Size::new(right - left + 1, bottom - top + 1)
+        })
+    }
+
+    /// Name of what was filmed, without the folders that it lay in.
+    pub fn example_name(&self) -> String {
+        self.document.note.source.short_name().to_owned()
     }
 
     /// The new tree with this number. The same seed and number give the same tree, whatever others
@@ -241,6 +270,9 @@ impl Parent {
             outline,
             picture: None,
             bark,
+            leaves: (!self.leaf_rgb.is_empty()).then(|| LeavesNote {
+                rgb: self.leaf_rgb.clone(),
+            }),
             masks: None,
             build: None,
             refinement: None,
@@ -266,8 +298,8 @@ fn for_new_trees(shape: &mut config::Shape, likeness: &Likeness) {
     }
 }
 
-/// The document, and whether its tree bears leaves.
-fn looked_at(mut document: Document) -> Result<(Document, bool), PrepareError> {
+/// The document, and the leaves that its tree bears.
+fn looked_at(mut document: Document) -> Result<(Document, Foliage), PrepareError> {
     let poses = std::mem::take(&mut document.poses);
     let config = document.note.config.clone();
     let options = TreeOptions {
@@ -275,12 +307,11 @@ fn looked_at(mut document: Document) -> Result<(Document, bool), PrepareError> {
         ..TreeOptions::default()
     };
     let tree = PreparedTree::new(document, options)?;
-    let in_leaf = !tree.dressed.foliage.groups.is_empty();
     let document = Document {
         poses,
         ..tree.document
     };
-    Ok((document, in_leaf))
+    Ok((document, tree.dressed.foliage))
 }
 
 /// A loop of the tree in the wind of the settings.

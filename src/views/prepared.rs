@@ -132,6 +132,7 @@ impl PreparedTree {
             outline_at_rest: document.outline_at_rest.as_ref(),
             cut_to: posed.cut_to.as_ref(),
             bark: document.bark.as_ref(),
+            leaf_rgb: document.note.leaf_rgb(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
         };

@@ -5,6 +5,7 @@ use crate::document::DocumentError;
 use crate::draw::{BoundingCylinder, Camera, Look, Model, Posed, Rgba, Texture, View, picture};
 use crate::export::{ExportError, Film};
 use crate::files::WriteError;
+use crate::geometry::Mesh;
 use crate::model::{LeafSwing, Pose, Size};
 use crate::signal::reflection::there_and_back;
 use std::f64::consts::TAU;
@@ -15,7 +16,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Length of a video if none is given, s.
 pub const VIDEO_S: f64 = 10.0;
 /// Size of a picture where neither the user nor the film says one.
-const PLAIN: Size = Size {
+pub(super) const PLAIN: Size = Size {
     width: 640,
     height: 480,
 };
@@ -84,13 +85,7 @@ impl<'a> Studio<'a> {
                 file: "motion.csv",
             }));
         }
-        let mut model = Model::bare(&tree.skeleton, wood, tree.dressed.bark.rgb);
-        model.bark = tree.dressed.bark.tile.as_deref().and_then(Texture::of);
-        if !shot.bare {
-            model.foliage = &tree.dressed.foliage;
-            let texture = model.foliage.texture.as_ref();
-            model.leaf = texture.and_then(|(_, bytes)| Texture::read(bytes));
-        }
+        let model = model(tree, wood, shot.bare);
         let filmed = tree.document.picture.as_ref().map(|p| p.rgb.size);
         let of_film = filmed.filter(|_| shot.film.is_some());
         let size = shot.size.or(of_film).unwrap_or(PLAIN);
@@ -232,6 +227,18 @@ impl<'a> Studio<'a> {
     }
 }
 
+/// The tree as it is drawn, with `wood`.
+pub(super) fn model<'a>(tree: &'a PreparedTree, wood: &'a Mesh, bare: bool) -> Model<'a> {
+    let mut model = Model::bare(&tree.skeleton, wood, tree.dressed.bark.rgb);
+    model.bark = tree.dressed.bark.tile.as_deref().and_then(Texture::of);
+    if !bare {
+        model.foliage = &tree.dressed.foliage;
+        let texture = model.foliage.texture.as_ref();
+        model.leaf = texture.and_then(|(_, bytes)| Texture::read(bytes));
+    }
+    model
+}
+
 /// The part of the poses that a video shows.
 struct Clip {
     /// Not at rest.
@@ -258,7 +265,7 @@ impl Clip {
 }
 
 /// Samples a pixel on a side: as many as fit into memory, at most 3.
-fn samples(size: Size) -> u32 {
+pub(super) fn samples(size: Size) -> u32 {
     let mut samples = 3;
     while samples > 1 && size.area() * samples * samples > MOST_SAMPLES {
         samples -= 1;
@@ -283,7 +290,7 @@ fn rgb(drawn: &Rgba) -> Vec<u8> {
     pixels.flat_map(|p| [p[0], p[1], p[2]]).collect()
 }
 
-fn png(drawn: &Rgba) -> Result<Vec<u8>, ExportError> {
+pub(super) fn png(drawn: &Rgba) -> Result<Vec<u8>, ExportError> {
     let mut png = Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut png,

@@ -2,7 +2,7 @@
 //
 //   ARBORCAM_NPM=DIR ARBORCAM_CHROMIUM=PROGRAM node checks.mjs FOLDER
 //
-// FOLDER holds page.html, page-m.html (the same tree in metres), page-one.html (one node), tree.glb, outline.json,
+// FOLDER holds page.html, page-m.html (the same tree in metres), page-one.html (one node), page-forest.html, tree.glb, outline.json,
 // title.txt.
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -349,6 +349,25 @@ await check("a tree of one node opens, without what it does not have", async () 
   for (const mode of ["branch", "frequency", "amplitude"]) await one.getByLabel("Colour", { exact: true }).selectOption(mode);
   hold(!(await one.getByRole("alert").isVisible()), "it apologises");
   await one.context().close();
+});
+
+await check("a forest opens and sways, without what it does not have", async () => {
+  const forest = await open(browser, file("page-forest.html"), {}, bad);
+  await ready(forest);
+  const about = await forest.locator("#about").textContent();
+  hold(about.startsWith("5 trees of 2 grown from"), about);
+  for (const name of ["Skeleton", "Film"]) {
+    hold(await forest.getByRole("button", { name, exact: true }).isDisabled(), `${name} can be pressed`);
+  }
+  for (const id of ["#colour", "#branch", "#hint"]) hold(!(await forest.locator(id).isVisible()), `${id} is shown`);
+  const [a, b] = [await shot(forest, 100), await shot(forest, 900)];
+  const moved = await differs(a, b, 0.002, "playing");
+  await forest.getByRole("button", { name: "Mesh", exact: true }).click();
+  await differs(b, await shot(forest), 0.01, "without the trees");
+  for (const name of ["Front", "Side", "Top"]) await forest.getByRole("button", { name, exact: true }).click();
+  hold(!(await forest.getByRole("alert").isVisible()), "it apologises");
+  await forest.context().close();
+  return moved;
 });
 
 await check("nothing is asked of the network and nothing complains", async () => {

@@ -18,7 +18,7 @@ const MAX_SIDE_PX: u32 = 4096;
 
 #[derive(Debug, Args)]
 pub struct RenderArgs {
-    /// A capture: the folder written by `capture` or `replay --out`.
+    /// A capture: the folder written by `capture` or `replay --out`; or a forest made by `grow`.
     pub dir: PathBuf,
     /// Direction of view; `turntable` goes once round the tree.
     #[arg(long, value_name = "VIEW", default_value = "front")]
@@ -152,6 +152,28 @@ impl RenderArgs {
             );
         }
         Ok(kind)
+    }
+
+    /// Checks that nothing is asked for that a forest does not have: its pictures are of its rest.
+    ///
+    /// # Errors
+    /// A message for the user: the option.
+    pub fn check_forest(&self, kind: Kind) -> Result<(), String> {
+        if kind == Kind::Video {
+            return Err(
+                "a forest is drawn as a picture; name one with --out FILE.png, or see it move with \
+                 `arborcam export --format html`"
+                    .into(),
+            );
+        }
+        if self.film.is_some() || self.at.is_some() || self.tree.is_given() {
+            return Err(
+                "--film, --at and the options of the tree do not go with a forest; draw one of its \
+                 trees, which are folders of their own"
+                    .into(),
+            );
+        }
+        Ok(())
     }
 
     /// What to draw.

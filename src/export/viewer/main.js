@@ -2,6 +2,7 @@
 import { Choice } from "./choice.js";
 import { readData, readModel, readPicture } from "./data.js";
 import { Film, rectangle } from "./film.js";
+import { Forest } from "./forest.js";
 import { listen } from "./keys.js";
 import { fillModes } from "./modes.js";
 import { Paint } from "./paint.js";
@@ -24,6 +25,13 @@ function sorry(text) {
 
 function describe(data) {
   at("title").textContent = document.title = data.title;
+  if (data.forest) {
+    const { trees, templates } = data.forest;
+    at("about").textContent = `${trees} ${trees === 1 ? "tree" : "trees"} of ${templates} grown from ${data.source}`;
+    at("made").textContent = `${data.software}.`;
+    document.body.classList.add("forest");
+    return;
+  }
   const measured = data.branches.filter((b) => b.parent !== null && b.moves_with === null && b.copy_of === null).length;
   const copies = data.branches.filter((b) => b.copy_of !== null).length;
   const parts = [
@@ -60,8 +68,8 @@ function partButtons(stage, tree, skeleton, film, { views, look, atFilm }) {
       look();
     },
   };
-  const there = { skeleton: true, mesh: tree.wood.length > 0, leaves: tree.leaves.length > 0, film: film !== null };
-  const why = { mesh: "This model has no mesh", leaves: "This model has no leaves", film: "This capture has no picture" };
+  const there = { skeleton: !(tree instanceof Forest), mesh: tree.wood.length > 0, leaves: tree.leaves.length > 0, film: film !== null };
+  const why = { skeleton: "A forest has no skeleton here", mesh: "This model has no mesh", leaves: "This model has no leaves", film: "This capture has no picture" };
   return Object.fromEntries(
     [...document.querySelectorAll("[data-part]")].map((button) => {
       const part = button.dataset.part;
@@ -101,7 +109,7 @@ async function open() {
     sorry("This browser cannot draw in 3D (WebGL 2 is off or missing). Another browser can; the model can be downloaded above.");
     return;
   }
-  const [tree, picture] = await Promise.all([Tree.load(model, data), readPicture()]);
+  const [tree, picture] = await Promise.all([(data.forest ? Forest : Tree).load(model, data), readPicture()]);
   const box = tree.box();
   const views = new Views(stage, box);
   const sway = new Sway(data);
@@ -122,7 +130,7 @@ async function open() {
   }
   stage.beforeDraw.push(() => {
     skeleton.update();
-    rings.visible = !film?.object.visible;
+    rings.visible = !film?.object.visible && !data.forest;
   });
 
   const paint = new Paint(tree, data, sway, skeleton, at("legend"));
@@ -171,6 +179,8 @@ async function open() {
   );
   recolour();
   views.show("front", false);
+  // From the front the first row hides the others.
+  if (data.forest) views.turn(0.5, 0.4, 0.75);
   stage.draw();
   // Browsers may restore a form's last state over the page's first one.
   performance.mark("arborcam-ready");

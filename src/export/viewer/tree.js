@@ -16,14 +16,15 @@ export class Tree {
     this.joints = new Map();
     this.wood = [];
     this.leaves = [];
+    this.ground = [];
     gltf.scene.traverse((object) => {
       const id = jointId(object);
       if (id !== null) this.joints.set(id, object);
       if (!object.isMesh) return;
       // The box at rest is not where the tree is in the wind.
       object.frustumCulled = false;
-      const leaf = /^leaves/.test(object.name) || /^leaves/.test(object.parent?.name ?? "");
-      (leaf ? this.leaves : this.wood).push(object);
+      const kinds = { leaf: this.leaves, ground: this.ground };
+      (kinds[object.material.name] ?? this.wood).push(object);
     });
     this.branches = [];
     for (const branch of data.branches) {

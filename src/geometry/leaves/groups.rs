@@ -3,6 +3,7 @@
 use super::attachment::AttachmentPoint;
 use super::cluster::Cluster;
 use super::faces::{area_vector, share_along};
+use super::palette::any_of;
 use super::target::Target;
 use super::template::Template;
 use super::view::PLAIN;
@@ -36,6 +37,7 @@ pub(super) fn groups(
     attachments: &[AttachmentPoint],
     skeleton: &Skeleton,
     target: Option<&Target>,
+    palette: &[[u8; 3]],
     template: &Template,
     height: f64,
 ) -> Vec<FoliageGroup> {
@@ -61,6 +63,7 @@ pub(super) fn groups(
     let drawer = Drawer {
         skeleton,
         target,
+        palette,
         template,
         height,
         middle,
@@ -139,6 +142,7 @@ fn nearest(among: &[usize], node: usize, skeleton: &Skeleton) -> Option<usize> {
 struct Drawer<'a> {
     skeleton: &'a Skeleton,
     target: Option<&'a Target>,
+    palette: &'a [[u8; 3]],
     template: &'a Template,
     height: f64,
     /// Of the crown.
@@ -148,12 +152,13 @@ struct Drawer<'a> {
 impl Drawer<'_> {
     /// Colour of a leaf that is seen at `posed` in a cluster of `size` px (sRGB).
     fn colour(&self, posed: &Point3<f64>, size: f64) -> [u8; 3] {
+        let of_palette = any_of(self.palette, posed);
         let film = match self.target {
-            Some(target) => {
+            Some(target) if target.has_colours() || of_palette.is_none() => {
                 let radius = (0.15 * target.grid.length(size)).max(1.0);
                 target.soft_colour(target.grid.cell_of(posed), radius)
             }
-            None => PLAIN.map(f64::from),
+            _ => of_palette.unwrap_or(PLAIN).map(f64::from),
         };
         // Colour times texture is to be what the film shows.
         let texture = self.template.texture_mean;

@@ -16,6 +16,7 @@ mod faces;
 mod groups;
 mod hidden;
 mod mixture;
+mod palette;
 mod place;
 mod season;
 mod target;
@@ -25,6 +26,7 @@ mod view;
 mod wood;
 
 pub use beyond::within_leaves;
+pub use palette::leaf_palette;
 pub use season::{Season, season};
 pub use template::{Template, TemplateFault, TemplateMesh};
 pub use view::{LeafColours, LeafView, Sampling};
@@ -102,6 +104,7 @@ pub fn foliage_by(
             &attachments.all,
             skeleton,
             target.as_ref(),
+            view.palette,
             template,
             height,
         ),

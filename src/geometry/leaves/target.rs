@@ -148,6 +148,11 @@ impl Target {
         seed_of_part(0, place as u64)
     }
 
+    /// Whether the picture shows colours of leaves.
+    pub fn has_colours(&self) -> bool {
+        !self.colours.is_empty()
+    }
+
     /// The colour around a cell with its light and shade softened, channels 0 to 255.
     pub fn soft_colour(&self, cell: Point2<f64>, radius: f64) -> [f64; 3] {
         let colour = self.colour(cell, radius);

@@ -17,6 +17,8 @@ pub struct LeafView<'a> {
     /// for the whole picture.
     pub density: Option<&'a Luma>,
     pub colours: LeafColours,
+    /// Colours of leaves (sRGB) where the picture shows none, by chance; may be empty.
+    pub palette: &'a [[u8; 3]],
     /// Corners in the picture, px, strongest first.
     pub seeds: &'a [Point2<f32>],
 }
@@ -30,7 +32,7 @@ pub enum LeafColours {
     /// Of any leaves in the picture, by chance: the tree was given another shape than it has there,
     /// and its leaves are not those that are seen in their places.
     Anywhere,
-    /// One colour: the picture shows no leaves.
+    /// Those of the palette, else one colour: the picture shows no leaves.
     Plain,
 }
 
