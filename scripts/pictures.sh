@@ -139,17 +139,17 @@ grow() {
 grown() {
     local threshold level tree
     capture winter
-    grow offspring winter --count 4
+    grow offspring winter --count 8
     for threshold in 0.6 0.4 0.2; do
         grow "turned-$threshold" winter --count 1 --like von-mises --threshold "$threshold"
     done
     for level in 4 3 2; do
         grow "from-$level" winter --count 1 --like von-mises --from-level "$level"
     done
-    for tree in winter offspring/tree-000{1,2,3,4} turned-{0.6,0.4,0.2}/tree-0001 from-{4,3,2}/tree-0001; do
+    for tree in winter offspring/tree-000{1..8} turned-{0.6,0.4,0.2}/tree-0001 from-{4,3,2}/tree-0001; do
         render_made "$tree"
     done
-    row "$to/grown.png" "$work"/made-winter.png "$work"/made-offspring-tree-000{1,2,3,4}.png
+    row "$to/grown.png" "$work"/made-winter.png "$work"/made-offspring-tree-000{1..8}.png
     row "$to/turned.png" "$work"/made-winter.png "$work"/made-turned-{0.6,0.4,0.2}-tree-0001.png
     row "$to/turned-from.png" "$work"/made-winter.png "$work"/made-from-{4,3,2}-tree-0001.png
     "$python" scripts/pictures.py triangles "$work/winter" "$work/offspring" "$to/triangles.png"

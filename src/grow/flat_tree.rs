@@ -18,7 +18,7 @@ pub const FEWEST_FORKS: usize = 3;
 /// Bifurcations that are looked at for one leaf, at first, each with its mirror image.
 const HAND: usize = 24;
 /// Trees of which the one that fills the region best is taken.
-const TREES: u32 = 8;
+const TREES: u32 = 24;
 /// How often bifurcations are tried: first where they are to grow, then at random tips.
 const ROUNDS: u32 = 4;
 /// A direction that is less likely than this, as a share of the likeliest, is not taken: without it

@@ -130,12 +130,13 @@ impl MotionStatistics {
     pub fn sample(&self, skeleton: &Skeleton, most_rad: f64, random: &mut Generator) -> Vec<Pose> {
         let branches = skeleton.moving_branches();
         let levels = LevelShares::of(skeleton);
+        let circle = Circle::of(self.steps);
         let mut turns: Vec<Vec<Vector3<f64>>> = Vec::with_capacity(branches.len());
         for branch in &branches {
             let node = &skeleton.nodes[branch.node.index()];
             let share = levels.of_node(branch.node);
             let into_plane = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-            let own = self.loop_of(share, random);
+            let own = self.loop_of(share, &circle, random);
             let farthest = own.iter().map(Vector3::norm).fold(0.0, f64::max);
             let scale = if farthest > most_rad {
                 most_rad / farthest
@@ -153,7 +154,12 @@ impl MotionStatistics {
     }
 
     /// How a branch turns whose level is this share of the deepest, radians, by step.
-    fn loop_of(&self, share_of_deepest: f64, random: &mut Generator) -> Vec<Vector3<f64>> {
+    fn loop_of(
+        &self,
+        share_of_deepest: f64,
+        circle: &Circle,
+        random: &mut Generator,
+    ) -> Vec<Vector3<f64>> {
         let mut turns = vec![Vector3::zeros(); self.steps];
         let wanted = share_of_deepest * f64::from(self.deepest);
         let Some(of) = at_level(&self.levels, wanted, random) else {
@@ -166,7 +172,7 @@ impl MotionStatistics {
                 sines: drawn(&spectrum.sines, strength.sines[axis], random),
             };
             for (k, turn) in turns.iter_mut().enumerate() {
-                turn[axis] = amplitudes.at(k, self.steps);
+                turn[axis] = amplitudes.at(k, circle);
             }
         }
         turns
@@ -185,22 +191,36 @@ fn drawn(shares: &Option<Dirichlet>, strength: f64, random: &mut Generator) -> V
 }
 
 impl Amplitudes {
-    /// The angle at step `k` of a loop of `steps`, radians.
-    fn at(&self, k: usize, steps: usize) -> f64 {
-        let by_cosine = self.cosines.iter().enumerate();
-        let by_sine = self.sines.iter().enumerate();
-        by_cosine
-            .map(|(bin, a)| a * angle(bin, k, steps).cos())
-            .sum::<f64>()
-            + by_sine
-                .map(|(bin, b)| b * angle(bin, k, steps).sin())
-                .sum::<f64>()
+    /// The angle at step `k` of a loop, radians.
+    fn at(&self, k: usize, circle: &Circle) -> f64 {
+        let mut sum = 0.0;
+        for (bin, a) in self.cosines.iter().enumerate() {
+            sum += a * circle.cosines[circle.step(bin, k)];
+        }
+        for (bin, b) in self.sines.iter().enumerate() {
+            sum += b * circle.sines[circle.step(bin, k)];
+        }
+        sum
     }
 }
 
-/// Phase of the frequency `bin` at step `k` of a loop of `steps`, radians.
-fn angle(bin: usize, k: usize, steps: usize) -> f64 {
-    TAU * ((bin + 1) * k % steps) as f64 / steps as f64
+/// Cosine and sine at each of the even steps once round a circle.
+struct Circle {
+    cosines: Vec<f64>,
+    sines: Vec<f64>,
+}
+
+impl Circle {
+    fn of(steps: usize) -> Self {
+        let angles = (0..steps).map(|k| TAU * k as f64 / steps as f64);
+        let (sines, cosines) = angles.map(f64::sin_cos).unzip();
+        Self { cosines, sines }
+    }
+
+    /// Where the frequency `bin` is at step `k` of a loop.
+    fn step(&self, bin: usize, k: usize) -> usize {
+        (bin + 1) * k % self.cosines.len()
+    }
 }
 
 /// What was found in all pieces of all branches.
