@@ -83,6 +83,19 @@ fn forest() -> &'static Path {
     &made.1
 }
 
+#[test]
+fn a_forest_at_rest_has_no_file_in_motion() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("still");
+    let more = "--forest --count 2 --templates 1 --motion none";
+    let output = grow(&out, &more.split(' ').collect::<Vec<_>>());
+    assert!(output.status.success(), "{output:?}");
+    let names = names_in(&out);
+    assert!(names.iter().any(|name| name == "forest.glb"), "{names:?}");
+    let moving = names.iter().any(|name| name == "forest_moving.glb");
+    assert!(!moving, "{names:?}");
+}
+
 /// The JSON of a GLB file.
 fn json_of(name: &str) -> Value {
     let bytes = fs::read(forest().join(name)).expect("file");

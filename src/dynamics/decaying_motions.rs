@@ -17,6 +17,8 @@ const MOST_POINTS: usize = 120;
 /// this share of them.
 const FRAMES_PER_S: f64 = 15.0;
 const MAX_FREQ_OF_RATE: f64 = 0.3;
+/// More modes than motions that are fitted at most.
+const MODES_BEYOND_MOTIONS: usize = 2;
 /// Noise is at most this share of a motion.
 pub(super) const MAX_NOISE_SHARE: f64 = 0.5;
 /// Frames that are needed, taken together.
@@ -60,16 +62,18 @@ impl DecayingMotions {
         )
     }
 
-    /// Share of the largest motions, of like size and without noise, that so many free decays leave;
-    /// `None` where there is no motion, or `cancel` ends the search before.
+    /// Share of the largest motions, of like size and without noise, that so many free decays leave at
+    /// most; `None` where there is no motion, or `cancel` ends the search before. Fewer are fitted to
+    /// few motions: six decays describe ten seconds of any single one.
     pub fn share_left(
         &self,
-        modes: usize,
+        most_modes: usize,
         at_s: f64,
         frequencies_hz: Bounds,
         cancel: &CancelToken,
     ) -> Option<f64> {
         let signals = self.signals(at_s, Start::Moving, frequencies_hz);
+        let modes = most_modes.min(MODES_BEYOND_MOTIONS + self.motions.above_noise());
         let left = signals.fit_modes(modes, cancel)?.rss;
         let all = signals.squares();
         let noise = self.motions.noise_of_like_size().min(MAX_NOISE_SHARE * all);

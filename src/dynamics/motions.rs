@@ -11,6 +11,8 @@ use nalgebra::{DVector, Vector2};
 /// Motions that are kept at most, and those that a subspace is of.
 const MOST: usize = 24;
 pub(super) const OF_SUBSPACE: usize = 8;
+/// Variance of a motion against that of noise, from which it is one.
+const LEAST_ABOVE_NOISE: f64 = 2.0;
 
 /// The few motions that those of many points are made of.
 pub(super) struct Motions {
@@ -65,6 +67,12 @@ impl Motions {
             out.push(motion.iter().map(|x| x / scale).collect());
         }
         out
+    }
+
+    /// How many of them are larger than noise.
+    pub fn above_noise(&self) -> usize {
+        let least = LEAST_ABOVE_NOISE * self.noise;
+        self.variances.iter().filter(|v| **v > least).count()
     }
 
     /// Squares that noise makes in all of [`of_like_size`](Self::of_like_size).

@@ -53,7 +53,7 @@ pub struct ForestTemplate<'a> {
     pub model: Model<'a>,
 }
 
-/// All files of a forest.
+/// All files of a forest; that in motion where a template moves.
 ///
 /// # Errors
 /// A template is none for a file (see [`glb`](super::gltf::glb)), or a tree is of none of them.
@@ -67,7 +67,10 @@ pub fn forest_files(model: &ForestModel) -> Result<Vec<NamedBytes>, ExportError>
         files.push((name, forest_glb(model, level)?));
     }
     files.push(("forest_instanced.glb".to_owned(), instanced_glb(model)?));
-    files.push(("forest_moving.glb".to_owned(), moving_glb(model)?));
+    let is_moving = |template: &ForestTemplate| !template.model.poses.is_empty();
+    if model.templates.iter().any(is_moving) {
+        files.push(("forest_moving.glb".to_owned(), moving_glb(model)?));
+    }
     Ok(files)
 }
 
