@@ -55,13 +55,14 @@ impl Fork {
 /// from the foot has no stem; a fork with a branch without length, or at a place that is no number,
 /// is left out.
 pub fn bifurcations(tree: &[Node2d]) -> Vec<Bifurcation> {
-    forks(tree).into_iter().map(|fork| fork.shape).collect()
-}
-
-/// The same, with what they carry.
-pub(super) fn forks(tree: &[Node2d]) -> Vec<Fork> {
     let children = children(tree);
     let carried = carried_forks(tree, &children);
+    let forks = forks(tree, &children, &carried);
+    forks.into_iter().map(|fork| fork.shape).collect()
+}
+
+/// The same with what they carry, from the [`children`] and [`carried_forks`] of the nodes.
+pub(super) fn forks(tree: &[Node2d], children: &[Vec<usize>], carried: &[usize]) -> Vec<Fork> {
     let mut found = Vec::new();
     for (i, node) in tree.iter().enumerate() {
         let Some(parent) = node.parent else { continue };
@@ -96,13 +97,20 @@ pub(super) fn children(tree: &[Node2d]) -> Vec<Vec<usize>> {
 /// Number of forks into two at and above every node; a fork into more counts as one less than it has
 /// branches.
 pub(super) fn carried_forks(tree: &[Node2d], children: &[Vec<usize>]) -> Vec<usize> {
-    let mut carried: Vec<usize> = children.iter().map(|c| c.len().saturating_sub(1)).collect();
+    with_all_above(
+        tree,
+        children.iter().map(|c| c.len().saturating_sub(1)).collect(),
+    )
+}
+
+/// The sum of a count of every node and of those of all nodes above it.
+pub(super) fn with_all_above(tree: &[Node2d], mut counts: Vec<usize>) -> Vec<usize> {
     for i in (1..tree.len()).rev() {
         if let Some(parent) = tree[i].parent {
-            carried[parent] += carried[i];
+            counts[parent] += counts[i];
         }
     }
-    carried
+    counts
 }
 
 /// A branch that leaves a fork.

@@ -1,7 +1,7 @@
 //! A new flat tree, grown fork by fork from root to leaf (Li 2011 sect. 5.3).
 
 use super::dirichlet::{Dirichlet, DirichletFit, fit};
-use super::features::{Bifurcation, Fork, carried_forks, children, forks};
+use super::features::{Bifurcation, Fork, carried_forks, children, forks, with_all_above};
 use super::fork_tree::fork_tree;
 use super::space::GrowthSpace;
 use super::von_mises::VonMises;
@@ -12,6 +12,7 @@ use nalgebra::{Point2, Rotation2, Vector2};
 use rand::RngExt;
 use rand::seq::SliceRandom;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// An example with fewer forks says nothing on what forks are like.
 pub const FEWEST_FORKS: usize = 3;
@@ -33,12 +34,9 @@ const GAIN_FLOOR: f64 = 0.002;
 /// What an example says on the form of trees like it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForkStatistics {
-    /// Of its forks, without their mirror images.
-    pub bifurcations: Vec<Bifurcation>,
-    /// Learned from them and their mirror images, so that left and right are alike.
-    pub angles: DirichletFit,
-    pub lengths: DirichletFit,
-    /// The same of bifurcations whose left branch leads on: it carries more. Where both carry as
+    /// Of its bifurcations and their mirror images, so that left and right are alike.
+    pub alike: ForkShapes,
+    /// Of bifurcations whose left branch leads on: it carries more. Where both carry as
     /// much either does.
     pub leading_left: ForkShapes,
     /// How forks share out what grows on from them.
@@ -100,26 +98,24 @@ impl ForkStatistics {
 
     /// Of a flat tree of forks and tips with the trunk's top there, px.
     fn of_tree(tree: &[Node2d], top_px: Point2<f64>) -> Result<Self, GrowError> {
-        let forks = forks(tree);
-        let found: Vec<Bifurcation> = forks.iter().map(|fork| fork.shape).collect();
-        let few = GrowError::TooFewForks { found: found.len() };
-        if found.len() < FEWEST_FORKS {
-            return Err(few);
-        }
-        let mirrored = found.iter().map(|fork| fork.mirrored());
-        let alike = ForkShapes::of(found.iter().copied().chain(mirrored));
-        let led = ForkShapes::of(forks.iter().flat_map(Fork::leading_left));
-        let (Some(ForkShapes { angles, lengths }), Some(leading_left)) = (alike, led) else {
-            return Err(few);
-        };
         let children = children(tree);
         let carried = carried_forks(tree, &children);
+        let forks = forks(tree, &children, &carried);
+        let few = GrowError::TooFewForks { found: forks.len() };
+        if forks.len() < FEWEST_FORKS {
+            return Err(few);
+        }
+        let own = forks.iter().map(|fork| fork.shape);
+        let mirrored = forks.iter().map(|fork| fork.shape.mirrored());
+        let alike = ForkShapes::of(own.chain(mirrored));
+        let led = ForkShapes::of(forks.iter().flat_map(Fork::leading_left));
+        let (Some(alike), Some(leading_left)) = (alike, led) else {
+            return Err(few);
+        };
         let trunk = Trunk::of(tree, &children, top_px);
         let [leading, others] = directions(tree, &children, &carried);
         Ok(Self {
-            bifurcations: found,
-            angles,
-            lengths,
+            alike,
             leading_left,
             sharing: Sharing::of(&forks),
             leading,
@@ -133,18 +129,9 @@ impl ForkStatistics {
 
     /// Length of a stem whose fork has branches as long as those of the main fork, px.
     fn first_stem_px(&self) -> f64 {
-        let mean = self.lengths.distribution.mean();
+        let mean = self.alike.lengths.distribution.mean();
         let stem = mean.first().copied().unwrap_or(1.0 / 3.0);
         self.first_px * stem / (0.5 * (1.0 - stem)).max(f64::MIN_POSITIVE)
-    }
-
-    /// How natural it is that the leading branch of a fork and the other one turn so far from the
-    /// direction away from the foot, radians, as shares of what is most natural.
-    fn likelihoods(&self, [leading, other]: [f64; 2]) -> [f64; 2] {
-        [
-            self.leading.likelihood(leading),
-            self.others.likelihood(other),
-        ]
     }
 
     /// A bifurcation like those of the example, whose left branch leads on.
@@ -216,12 +203,7 @@ impl Trunk {
     /// branch that carries most, the one at which the second branch carries most, the lowest of
     /// equals; else to the top. Twigs that leave the trunk do not end it.
     fn of(tree: &[Node2d], children: &[Vec<usize>], top_px: Point2<f64>) -> Self {
-        let mut carried = vec![1_usize; tree.len()];
-        for i in (1..tree.len()).rev() {
-            if let Some(parent) = tree[i].parent {
-                carried[parent] += carried[i];
-            }
-        }
+        let carried = with_all_above(tree, vec![1; tree.len()]);
         let (mut most, mut end_px, mut main_fork) = (0, top_px, None);
         let mut at = (!tree.is_empty()).then_some(0);
         while let Some(node) = at {
@@ -322,7 +304,7 @@ pub fn grow_flat(
     let trunk = Growth::on_trunk(example, space, foot_px, scale)?;
     let mut fullest = trunk.clone();
     for _ in 0..TREES {
-        let tree = grown(trunk.clone(), example, random);
+        let tree = grown(trunk.clone(), random);
         if tree.space.distance_px() < fullest.space.distance_px() {
             fullest = tree;
         }
@@ -331,11 +313,8 @@ pub fn grow_flat(
 }
 
 /// A tree on a trunk.
-fn grown<'a>(
-    mut trunk: Growth<'a>,
-    example: &ForkStatistics,
-    random: &mut Generator,
-) -> Growth<'a> {
+fn grown<'a>(mut trunk: Growth<'a>, random: &mut Generator) -> Growth<'a> {
+    let example = trunk.example;
     let mut unused: Vec<Bifurcation> = Vec::with_capacity(example.forks);
     unused.resize_with(example.forks, || example.sample(random));
     let mut leaves = vec![Leaf {
@@ -348,7 +327,7 @@ fn grown<'a>(
         } else {
             0.0
         };
-        trunk.round(leaves, &mut unused, least, example, random);
+        trunk.round(leaves, &mut unused, least, random);
         leaves = trunk.shared_out(unused.len(), random);
     }
     trunk
@@ -357,6 +336,7 @@ fn grown<'a>(
 /// A tree that is being grown.
 #[derive(Clone)]
 struct Growth<'a> {
+    example: &'a ForkStatistics,
     tree: Vec<Node2d>,
     space: GrowthSpace<'a>,
     /// Length that the first stem counts with, px.
@@ -375,12 +355,10 @@ struct Leaf {
 /// One way to go on from a leaf.
 #[derive(Clone, Copy, Debug)]
 struct Way {
-    /// Its place among those that are not used yet.
-    bifurcation: usize,
+    /// The place of its bifurcation among those that are not used yet.
+    number: usize,
     /// Of the branch that leads on, and of the other.
     ends_px: [Point2<f64>; 2],
-    /// How natural its directions are, the less likely one as a share of the likeliest.
-    likelihood: f64,
     /// How probable it is, but for a factor that all have.
     weight: f64,
 }
@@ -388,7 +366,7 @@ struct Way {
 impl<'a> Growth<'a> {
     /// The foot, and the trunk as the example has it.
     fn on_trunk(
-        example: &ForkStatistics,
+        example: &'a ForkStatistics,
         mut space: GrowthSpace<'a>,
         foot_px: Point2<f64>,
         scale: f64,
@@ -406,6 +384,7 @@ impl<'a> Growth<'a> {
         }
         space.add(foot_px, top_px);
         Ok(Self {
+            example,
             tree: vec![new_node(None, 0, foot_px), new_node(Some(0), 1, top_px)],
             shortest_px: SHORTEST * space.height_px(),
             gain_floor_px: GAIN_FLOOR * space.width_px(),
@@ -421,25 +400,22 @@ impl<'a> Growth<'a> {
         mut leaves: Vec<Leaf>,
         unused: &mut Vec<Bifurcation>,
         least_likelihood: f64,
-        example: &ForkStatistics,
         random: &mut Generator,
     ) {
         while let Some(leaf) = take_fullest(&mut leaves) {
-            let mut ways = Vec::new();
-            if self.tree[leaf.node].level < example.deepest {
-                unused.shuffle(random);
-                let hand = HAND.min(unused.len());
-                ways = self.ways(leaf.node, &unused[..hand], 0, example);
-                ways.retain(|way| way.likelihood >= least_likelihood);
-                if ways.is_empty() {
-                    ways = self.ways(leaf.node, &unused[hand..], hand, example);
-                    ways.retain(|way| way.likelihood >= least_likelihood);
-                }
+            if self.tree[leaf.node].level >= self.example.deepest {
+                continue;
             }
-            let Some(way) = best(ways) else { continue };
-            unused.swap_remove(way.bifurcation);
+            unused.shuffle(random);
+            let hand = HAND.min(unused.len());
+            let (some, others) = (0..hand, hand..unused.len());
+            let way = self
+                .best_way(leaf.node, unused, some, least_likelihood)
+                .or_else(|| self.best_way(leaf.node, unused, others, least_likelihood));
+            let Some(way) = way else { continue };
+            unused.swap_remove(way.number);
             let rest = leaf.forks - 1;
-            let leading = example.sharing.leading_of(rest, random);
+            let leading = self.example.sharing.leading_of(rest, random);
             let shares = [leading, rest - leading];
             for (node, forks) in self.fork(leaf.node, way).into_iter().zip(shares) {
                 leaves.extend((forks > 0).then_some(Leaf { node, forks }));
@@ -464,39 +440,40 @@ impl<'a> Growth<'a> {
             .collect()
     }
 
-    /// All ways to go on from `leaf` with one of some bifurcations, of which the first is number
-    /// `first`.
-    fn ways(
+    /// The most probable way to go on from `leaf` with one of the bifurcations `from`, the first of
+    /// equals; `None` where none fits.
+    fn best_way(
         &self,
         leaf: usize,
         bifurcations: &[Bifurcation],
-        first: usize,
-        example: &ForkStatistics,
-    ) -> Vec<Way> {
-        let mut ways = Vec::new();
-        for (number, bifurcation) in (first..).zip(bifurcations) {
-            for leads in 0..2 {
-                ways.extend(self.way(leaf, number, bifurcation, leads, example));
+        from: Range<usize>,
+        least_likelihood: f64,
+    ) -> Option<Way> {
+        let mut best: Option<Way> = None;
+        for number in from {
+            let bifurcation = &bifurcations[number];
+            for is_mirrored in [false, true] {
+                let way = self.way(leaf, number, bifurcation, is_mirrored, least_likelihood);
+                if let Some(way) = way
+                    && best.is_none_or(|best| way.weight > best.weight)
+                {
+                    best = Some(way);
+                }
             }
         }
-        ways
+        best
     }
 
-    /// With the left branch leading on, as it is (0), or with the right one, as its mirror image (1).
-    /// `None` where it leaves the region, or has a branch that is too short.
+    /// With a bifurcation whose left branch leads on, or with its mirror image. `None` where it leaves
+    /// the region, or has a branch that is too short or goes in too unlikely a direction.
     fn way(
         &self,
         leaf: usize,
         number: usize,
         bifurcation: &Bifurcation,
-        leads: usize,
-        example: &ForkStatistics,
+        is_mirrored: bool,
+        least_likelihood: f64,
     ) -> Option<Way> {
-        let shape = if leads == 0 {
-            *bifurcation
-        } else {
-            bifurcation.mirrored()
-        };
         let apex = self.tree[leaf].position_px;
         let stem = self.tree[self.tree[leaf].parent?].position_px - apex;
         let stem_px = if leaf == 1 {
@@ -504,23 +481,31 @@ impl<'a> Growth<'a> {
         } else {
             stem.norm()
         };
-        let mut ends_px = branches(&shape, apex, stem.normalize() * stem_px);
+        let stem = stem.normalize() * stem_px;
+        let ends_px = if is_mirrored {
+            let [left, right] = branches(&bifurcation.mirrored(), apex, stem);
+            [right, left]
+        } else {
+            branches(bifurcation, apex, stem)
+        };
         let fits = ends_px
             .iter()
             .all(|end| (end - apex).norm() >= self.shortest_px && self.space.holds(apex, *end));
         if !fits {
             return None;
         }
-        ends_px.rotate_left(leads);
         let foot_px = self.tree[0].position_px;
-        let directions = ends_px.map(|end| outward(foot_px, apex, end));
-        let [leading, other] = example.likelihoods(directions);
+        let [leading, other] = ends_px.map(|end| outward(foot_px, apex, end));
+        let leading = self.example.leading.likelihood(leading);
+        let other = self.example.others.likelihood(other);
+        if leading.min(other) < least_likelihood {
+            return None;
+        }
         let gain_px = self.space.gain(apex, ends_px) + self.gain_floor_px;
         let wood_px: f64 = ends_px.iter().map(|end| (end - apex).norm()).sum();
         Some(Way {
-            bifurcation: number,
+            number,
             ends_px,
-            likelihood: leading.min(other),
             weight: gain_px / wood_px.sqrt() * leading * other,
         })
     }
@@ -562,19 +547,6 @@ fn branches(bifurcation: &Bifurcation, apex: Point2<f64>, stem: Vector2<f64>) ->
         apex + Rotation2::new(to_left) * down * left,
         apex + Rotation2::new(to_left + between) * down * right,
     ]
-}
-
-/// The most probable of the ways, the first of equals; `None` of none.
-fn best(ways: Vec<Way>) -> Option<Way> {
-    ways.into_iter().reduce(more_probable)
-}
-
-fn more_probable(first: Way, second: Way) -> Way {
-    if second.weight > first.weight {
-        second
-    } else {
-        first
-    }
 }
 
 #[cfg(test)]
@@ -685,7 +657,11 @@ mod tests {
                 lengths.extend([fork.lengths.to_vec(), fork.mirrored().lengths.to_vec()]);
             }
         }
-        for (found, learned) in [(angles, &example.angles), (lengths, &example.lengths)] {
+        let ForkShapes {
+            angles: of_angles,
+            lengths: of_lengths,
+        } = &example.alike;
+        for (found, learned) in [(angles, of_angles), (lengths, of_lengths)] {
             let found = fit(&found).expect("forks").distribution;
             let pairs = found.mean().into_iter().zip(learned.distribution.mean());
             for (found, learned) in pairs {

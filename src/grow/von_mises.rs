@@ -54,12 +54,16 @@ impl VonMises {
 
     /// Density at an angle, 1/rad.
     pub fn density(&self, angle: f64) -> f64 {
-        (self.kappa * ((angle - self.mean).cos() - 1.0)).exp() / (TAU * self.scaled_i0)
+        self.likelihood(angle) / (TAU * self.scaled_i0)
     }
 
     /// Density at an angle as a share of the highest.
     pub fn likelihood(&self, angle: f64) -> f64 {
-        (self.kappa * ((angle - self.mean).cos() - 1.0)).exp()
+        self.likelihood_off_mean(angle - self.mean)
+    }
+
+    fn likelihood_off_mean(&self, off: f64) -> f64 {
+        (self.kappa * (off.cos() - 1.0)).exp()
     }
 
     /// How far from the mean the density is above `threshold` (1/rad), radians: pi where it is
@@ -88,8 +92,7 @@ impl VonMises {
         const TRIES: u32 = 1_000_000;
         for _ in 0..TRIES {
             let off = half_width * random.random_range(-1.0..=1.0);
-            let share = (self.kappa * (off.cos() - 1.0)).exp();
-            if random.random::<f64>() < share {
+            if random.random::<f64>() < self.likelihood_off_mean(off) {
                 return self.mean + off;
             }
         }
