@@ -5,8 +5,8 @@ use super::error::DocumentError;
 use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
 use crate::model::{
-    CaptureFacts, FilmCut, Judgement, LocalTime, Origin, Skeleton, SwayFacts, Swaying, Timing,
-    UserNotes, Verdict,
+    CaptureFacts, FilmCut, Judgement, LocalTime, Origin, Outline, Skeleton, SwayFacts, Swaying,
+    Timing, UserNotes, Verdict,
 };
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
@@ -113,6 +113,23 @@ pub struct OutlineNote {
     /// without a tree.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rest_polygon_px: Vec<[i32; 2]>,
+}
+
+impl OutlineNote {
+    /// Of an outline that was tracked from `frame` on, and of the same where the tree rests.
+    pub fn of(frame: u64, outline: &Outline, at_rest: Option<&Outline>) -> Self {
+        Self {
+            frame,
+            width: outline.size.width,
+            height: outline.size.height,
+            polygon_px: corners_px(outline),
+            rest_polygon_px: at_rest.map_or(Vec::new(), corners_px),
+        }
+    }
+}
+
+fn corners_px(outline: &Outline) -> Vec<[i32; 2]> {
+    outline.polygon_px.iter().map(|p| (*p).into()).collect()
 }
 
 /// The picture in the folder: the first frame that was tracked, whole.
@@ -329,6 +346,37 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
+    /// Of a tree that was not filmed.
+    pub fn not_filmed(
+        source: Source,
+        outline: Option<OutlineNote>,
+        model: ModelNote,
+        config: Config,
+    ) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            software: Software::default(),
+            captured_at: None,
+            notes: UserNotes::default(),
+            source,
+            timing: Timing::default(),
+            config,
+            outline,
+            picture: None,
+            bark: None,
+            leaves: None,
+            masks: None,
+            build: None,
+            refinement: None,
+            quality: Quality::default(),
+            verdict: None,
+            judged_by: None,
+            model: Some(model),
+            animation: None,
+            warnings: Vec::new(),
+        }
+    }
+
     /// Colours for leaves that no picture shows (sRGB); may be none.
     pub fn leaf_rgb(&self) -> &[[u8; 3]] {
         self.leaves.as_ref().map_or(&[], |leaves| &leaves.rgb)

@@ -374,12 +374,9 @@ pub(super) fn describe(
         },
         timing: timing(job),
         config: job.config.clone(),
-        outline: job.outline.as_ref().map(|o| OutlineNote {
-            frame: job.quality.first.map_or(0, |(frame, _)| frame),
-            width: o.size.width,
-            height: o.size.height,
-            polygon_px: corners_px(o),
-            rest_polygon_px: tree.map_or(Vec::new(), |tree| corners_px(&tree.outline_at_rest)),
+        outline: job.outline.as_ref().map(|outline| {
+            let frame = job.quality.first.map_or(0, |(frame, _)| frame);
+            OutlineNote::of(frame, outline, tree.map(|tree| &*tree.outline_at_rest))
         }),
         picture: job.picture.as_ref().map(|p| PictureNote {
             file: PICTURE_FILE.into(),
@@ -437,10 +434,6 @@ pub(super) fn timing(job: &CaptureJob) -> Timing {
         duration_s,
         ..job.shared.gaps()
     }
-}
-
-fn corners_px(outline: &Outline) -> Vec<[i32; 2]> {
-    outline.polygon_px.iter().map(|p| (*p).into()).collect()
 }
 
 /// What the user should know before trusting the result.

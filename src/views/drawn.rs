@@ -3,11 +3,9 @@
 use super::{Draft, PrepareError, write_document};
 use crate::config::{Config, Leader};
 use crate::document::Document;
-use crate::document::note::{
-    CaptureNote, ModelNote, OutlineNote, Quality, SCHEMA_VERSION, Software, Source,
-};
+use crate::document::note::{CaptureNote, ModelNote, OutlineNote, Source};
 use crate::import::FlatTree;
-use crate::model::{Outline, Pose, Skeleton, Timing, UserNotes};
+use crate::model::{Outline, Pose, Skeleton};
 use crate::pipeline::{MOST_RESHAPED, stand_drawn};
 use std::path::{Path, PathBuf};
 
@@ -73,39 +71,13 @@ impl DrawnTree {
 
 /// What `capture.json` says of a tree that was not filmed.
 fn note(name: String, skeleton: &Skeleton, region: &Outline, config: Config) -> CaptureNote {
-    let polygon_px: Vec<[i32; 2]> = region.polygon_px.iter().map(|p| [p.x, p.y]).collect();
-    let size = region.size;
-    CaptureNote {
-        schema_version: SCHEMA_VERSION,
-        software: Software::default(),
-        captured_at: None,
-        notes: UserNotes::default(),
-        source: Source {
-            name,
-            width: size.width,
-            height: size.height,
-            ..Source::default()
-        },
-        timing: Timing::default(),
-        outline: Some(OutlineNote {
-            frame: 0,
-            width: size.width,
-            height: size.height,
-            rest_polygon_px: polygon_px.clone(),
-            polygon_px,
-        }),
-        picture: None,
-        bark: None,
-        leaves: None,
-        masks: None,
-        build: None,
-        refinement: None,
-        quality: Quality::default(),
-        verdict: None,
-        judged_by: None,
-        model: Some(ModelNote::of(skeleton, config.export.metres_per_px)),
-        animation: None,
-        warnings: Vec::new(),
-        config,
-    }
+    let source = Source {
+        name,
+        width: region.size.width,
+        height: region.size.height,
+        ..Source::default()
+    };
+    let outline = OutlineNote::of(0, region, Some(region));
+    let model = ModelNote::of(skeleton, config.export.metres_per_px);
+    CaptureNote::not_filmed(source, Some(outline), model, config)
 }

@@ -3,16 +3,14 @@
 use super::{Draft, PrepareError, PreparedTree, TreeOptions, write_document};
 use crate::animate::{Animator, Known, Wind, wind_scale};
 use crate::config::{self, Config, EnvelopeKind, Leader, LeafShow};
-use crate::document::note::{
-    BarkNote, CaptureNote, LeavesNote, ModelNote, OutlineNote, Quality, Source,
-};
+use crate::document::note::{BarkNote, CaptureNote, LeavesNote, ModelNote, OutlineNote, Source};
 use crate::document::{BARK_FILE, Document};
 use crate::geometry::{Foliage, Template, leaf_palette};
 use crate::grow::{
     ForkStatistics, LOOP_S, MotionStatistics, Resampling, SideAngles, grow_flat, resample,
     sample_sway,
 };
-use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Timing, Unidentified};
+use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
 use std::path::{Path, PathBuf};
@@ -246,43 +244,27 @@ impl Parent {
 
     fn note(&self, tree: &Offspring) -> CaptureNote {
         let own = &self.document.note;
-        let polygon_px: Vec<[i32; 2]> = self.region.polygon_px.iter().map(|p| [p.x, p.y]).collect();
-        let outline = (!polygon_px.is_empty()).then(|| OutlineNote {
-            frame: 0,
-            width: self.region.size.width,
-            height: self.region.size.height,
-            rest_polygon_px: polygon_px.clone(),
-            polygon_px,
-        });
+        let source = Source {
+            name: format!("grown from {}", own.source.name),
+            format_asked: String::new(),
+            format_given: String::new(),
+            ..own.source
+        };
+        let has_outline = !self.region.polygon_px.is_empty();
+        let outline = has_outline.then(|| OutlineNote::of(0, &self.region, Some(&self.region)));
+        let model = ModelNote::of(&tree.skeleton, self.document.metres_per_px());
         let bark = self.document.bark.as_ref().map(|_| BarkNote {
             file: BARK_FILE.into(),
         });
         CaptureNote {
-            captured_at: None,
-            source: Source {
-                name: format!("grown from {}", own.source.name),
-                format_asked: String::new(),
-                format_given: String::new(),
-                ..own.source
-            },
-            timing: Timing::default(),
-            config: tree.config.clone(),
-            outline,
-            picture: None,
+            schema_version: own.schema_version,
+            software: own.software.clone(),
+            notes: own.notes.clone(),
             bark,
             leaves: (!self.leaf_rgb.is_empty()).then(|| LeavesNote {
                 rgb: self.leaf_rgb.clone(),
             }),
-            masks: None,
-            build: None,
-            refinement: None,
-            quality: Quality::default(),
-            verdict: None,
-            judged_by: None,
-            model: Some(ModelNote::of(&tree.skeleton, self.document.metres_per_px())),
-            animation: None,
-            warnings: Vec::new(),
-            ..own.clone()
+            ..CaptureNote::not_filmed(source, outline, model, tree.config.clone())
         }
     }
 }
