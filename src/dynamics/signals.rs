@@ -197,13 +197,19 @@ impl Signals {
             if cancel.is_cancelled() {
                 return None;
             }
-            let Some(new) = self.search(&fit) else {
+            let Some(more) = self.with_one_more(&fit) else {
                 break;
             };
-            fit.modes.push(new);
-            fit = self.fit(&fit, &[]);
+            fit = more;
         }
         Some(fit)
+    }
+
+    /// A fit of one mode more; `None` where there is none.
+    pub fn with_one_more(&self, fit: &Fit) -> Option<Fit> {
+        let mut start = fit.clone();
+        start.modes.push(self.search(fit)?);
+        Some(self.fit(&start, &[]))
     }
 
     /// Sum of the squares of all values.

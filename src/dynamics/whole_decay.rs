@@ -105,11 +105,10 @@ fn asked(
         if cancel.is_cancelled() {
             return None;
         }
-        let Some(new) = signals.search(&fit) else {
+        let Some(more) = signals.with_one_more(&fit) else {
             break;
         };
-        fit.modes.push(new);
-        fit = signals.fit(&fit, &vec![None; modes]);
+        fit = more;
         if modes >= LEAST_MODES {
             out.extend(slowest(&signals, &fit));
         }

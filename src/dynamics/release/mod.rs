@@ -214,8 +214,8 @@ struct Decay<'a> {
 }
 
 impl Decay<'_> {
-    /// What `n` modes that describe most of the motion of the points leave of it, px²; `None` where
-    /// there are not so many, or `cancel` ends the search before.
+    /// What `n` modes that describe most of the motion of the points, or as many as there are, leave of
+    /// it, px²; `None` where `cancel` ends the search before.
     fn left_by(&self, start: Start, n: usize) -> Option<f64> {
         let signals = Signals::new(
             self.times_s.clone(),
