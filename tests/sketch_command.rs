@@ -185,20 +185,23 @@ fn trees_are_grown_of_a_sketch() {
         assert_eq!(names_in(&out), ["tree-0001", "tree-0002"]);
         let grown = Document::read(&out.join("tree-0001"), 60.0).expect("a document");
         assert_eq!(grown.poses.is_empty(), name != "wind");
-        let height = |s: &Skeleton| s.nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
-        let ratio = height(&grown.skeleton) / height(&drawn);
+        let ratio = height_px(&grown.skeleton) / height_px(&drawn);
         assert!((0.7..1.3).contains(&ratio), "{name}: {ratio}");
     }
+}
+
+fn height_px(skeleton: &Skeleton) -> f64 {
+    let heights = skeleton.nodes.iter().map(|n| n.position.y);
+    heights.fold(0.0, f64::max)
+}
+
+fn svg(inside: &str) -> String {
+    format!(r#"<svg xmlns="http://www.w3.org/2000/svg" width="640" height="480">{inside}</svg>"#)
 }
 
 #[test]
 fn bad_drawings_get_one_line_and_leave_nothing() {
     let dir = tempfile::tempdir().expect("tempdir");
-    let svg = |inside: &str| {
-        format!(
-            r#"<svg xmlns="http://www.w3.org/2000/svg" width="640" height="480">{inside}</svg>"#
-        )
-    };
     let trunk = r#"<path id="trunk" d="M320 450 L320 200"/>"#;
     let far = svg(&format!(r#"{trunk}<path id="far" d="M500 100 L600 50"/>"#));
     let cases = [

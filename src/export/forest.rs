@@ -53,6 +53,12 @@ pub struct ForestTemplate<'a> {
     pub model: Model<'a>,
 }
 
+impl ForestTemplate<'_> {
+    fn is_moving(&self) -> bool {
+        !self.model.poses.is_empty()
+    }
+}
+
 /// All files of a forest; that in motion where a template moves.
 ///
 /// # Errors
@@ -67,8 +73,7 @@ pub fn forest_files(model: &ForestModel) -> Result<Vec<NamedBytes>, ExportError>
         files.push((name, forest_glb(model, level)?));
     }
     files.push(("forest_instanced.glb".to_owned(), instanced_glb(model)?));
-    let is_moving = |template: &ForestTemplate| !template.model.poses.is_empty();
-    if model.templates.iter().any(is_moving) {
+    if model.templates.iter().any(ForestTemplate::is_moving) {
         files.push(("forest_moving.glb".to_owned(), moving_glb(model)?));
     }
     Ok(files)

@@ -161,15 +161,13 @@ mod tests {
 
     /// A loop of ten seconds in which the trunk sways and each branch about its own end of it.
     fn sway(skeleton: &Skeleton) -> Vec<Pose> {
-        let angles = |time_s: f64| {
-            let swing = |hz: f64, rad: f64| rad * (TAU * hz * time_s).sin();
-            [0.0, swing(0.5, 0.1), swing(0.9, 0.15), swing(1.3, 0.2)]
-        };
+        const SWINGS: [(f64, f64); 4] = [(0.0, 0.0), (0.5, 0.1), (0.9, 0.15), (1.3, 0.2)];
         let mut poses = Vec::new();
         for frame in 0..=300 {
             let time_s = f64::from(frame) / 30.0;
             let mut joints: Vec<JointPose> = Vec::new();
-            for (node, angle) in skeleton.nodes.iter().zip(angles(time_s)) {
+            for (node, (hz, rad)) in skeleton.nodes.iter().zip(SWINGS) {
+                let angle = rad * (TAU * hz * time_s).sin();
                 let Some(parent) = node.parent.map(|p| p.index()) else {
                     joints.push(JointPose::at_rest(node.position));
                     continue;

@@ -235,7 +235,8 @@ mod tests {
             r#"<polyline points="100,200 110 180"/>"#,
             r#"<path d="M100 200L110 180"/>"#,
             r#"<path d="m 100,200 10,-20"/>"#,
-            r#"<g transform="translate(50 100) scale(10)"><g transform="matrix(1 0 0 1 5 10)"><path d="M0 0 l 1 -2"/></g></g>"#,
+            r#"<g transform="translate(50 100) scale(10)"><g transform="matrix(1 0 0 1 5 10)">
+                <path d="M0 0 l 1 -2"/></g></g>"#,
             r#"<path transform="rotate(90)" d="M200 -100 L180 -110"/>"#,
         ] {
             assert_eq!(points(inside), [[100.0, 200.0], [110.0, 180.0]], "{inside}");

@@ -27,6 +27,40 @@ pub fn modules(name: &str) -> Option<PathBuf> {
     }
 }
 
+/// The Khronos validator of glTF.
+pub struct Validator {
+    node: PathBuf,
+    modules: PathBuf,
+}
+
+impl Validator {
+    /// As of [`program`].
+    pub fn find() -> Option<Self> {
+        Some(Self {
+            node: program("node", "--version")?,
+            modules: modules("gltf-validator")?,
+        })
+    }
+
+    /// Fails where it finds an error in one of some files, or a warning.
+    pub fn finds_nothing_in(&self, files: &[PathBuf]) {
+        let mut validate = Command::new(&self.node);
+        validate
+            .arg("scripts/validate-glb.mjs")
+            .args(files)
+            .env("NODE_PATH", &self.modules);
+        let output = validate.output().expect("node");
+        let told = String::from_utf8_lossy(&output.stdout);
+        println!("{told}");
+        assert!(
+            output.status.success(),
+            "{told}{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        assert_eq!(told.matches("0 errors, 0 warnings").count(), files.len());
+    }
+}
+
 fn absent<T>(what: &str) -> Option<T> {
     let line = format!("{what}; run scripts/setup.sh --tests");
     assert!(

@@ -68,8 +68,18 @@ function partButtons(stage, tree, skeleton, film, { views, look, atFilm }) {
       look();
     },
   };
-  const there = { skeleton: !(tree instanceof Forest), mesh: tree.wood.length > 0, leaves: tree.leaves.length > 0, film: film !== null };
-  const why = { skeleton: "A forest has no skeleton here", mesh: "This model has no mesh", leaves: "This model has no leaves", film: "This capture has no picture" };
+  const there = {
+    skeleton: !(tree instanceof Forest),
+    mesh: tree.wood.length > 0,
+    leaves: tree.leaves.length > 0,
+    film: film !== null,
+  };
+  const why = {
+    skeleton: "A forest has no skeleton here",
+    mesh: "This model has no mesh",
+    leaves: "This model has no leaves",
+    film: "This capture has no picture",
+  };
   return Object.fromEntries(
     [...document.querySelectorAll("[data-part]")].map((button) => {
       const part = button.dataset.part;
