@@ -174,7 +174,8 @@ impl Envelope {
     pub fn contains(&self, p: &Point3<f64>) -> bool {
         self.row_at(p.y).is_some_and(|k| {
             let d = self.discs[k];
-            (p.x - d.centre_x).hypot(p.z) <= d.radius && self.is_seen_inside(k, p.x)
+            let dx = p.x - d.centre_x;
+            dx * dx + p.z * p.z <= d.radius * d.radius && self.is_seen_inside(k, p.x)
         })
     }
 

@@ -3,7 +3,7 @@
 
 use super::angles::{Angles, angle_between};
 use super::envelope::Envelope;
-use super::search::Search;
+use super::search::{Search, Swept};
 use super::trunk::in_trunk;
 use crate::config;
 use crate::model::Skeleton;
@@ -243,7 +243,7 @@ impl<'a> Pusher<'a> {
         };
         let normal = plane_normal(self.skeleton.nodes[i].plane_angle);
         let at = self.pushed[i];
-        let candidates = self.candidates(&Step {
+        let step = Step {
             node: i,
             parent,
             what,
@@ -251,7 +251,10 @@ impl<'a> Pusher<'a> {
             normal,
             at,
             with_children,
-        });
+        };
+        let pushes = self.possible_pushes(&step);
+        let swept = self.sweep(&step, &pushes);
+        let candidates = self.candidates(&step, &swept, &pushes);
         let Some(best) = most_probable(&candidates, self.terms, self.gain_floor) else {
             return;
         };
@@ -265,27 +268,35 @@ impl<'a> Pusher<'a> {
                 self.pushed[k] -= best - at;
             }
         }
-        self.search.moved(self.skeleton, &moved);
+        self.search.put_back(swept, self.skeleton, &moved);
     }
 
-    /// The pushes that are possible, and with a prior the one that leaves all where it is.
-    fn candidates(&self, step: &Step) -> Vec<Candidate> {
-        let without = self.search.distances_without(step.moved);
-        let before = self
-            .search
-            .total_distance(&without, step.moved, step.offset(0.0));
+    /// The pushes that are possible, and with a prior the one that leaves all where it is, px.
+    fn possible_pushes(&self, step: &Step) -> Vec<f64> {
         let n = self.settings.push_options;
         let mut pushes: Vec<f64> = (0..n).map(|l| self.delta * option(l, n)).collect();
         if self.prior.is_some() {
             pushes.push(step.at);
         }
+        pushes.retain(|push| *push == step.at || self.is_possible(step, *push));
+        pushes
+    }
+
+    /// The tree without what is moved, and what that may come near to on its way.
+    fn sweep(&self, step: &Step, pushes: &[f64]) -> Swept {
+        let ways = pushes.iter().map(|push| push - step.at);
+        let to_rest = -step.at;
+        let least = ways.clone().fold(to_rest, f64::min);
+        let most = ways.fold(to_rest, f64::max);
+        self.search.sweep(step.moved, &step.normal, least, most)
+    }
+
+    fn candidates(&self, step: &Step, swept: &Swept, pushes: &[f64]) -> Vec<Candidate> {
+        let before = swept.total_distance(step.offset(0.0));
         let mut candidates = Vec::with_capacity(pushes.len());
-        for push in pushes {
-            if push != step.at && !self.is_possible(step, push) {
-                continue;
-            }
+        for &push in pushes {
             let offset = step.offset(push);
-            let distance = self.search.total_distance(&without, step.moved, offset);
+            let distance = swept.total_distance(offset);
             candidates.push(Candidate {
                 push,
                 local: self.ln_likelihood(step, offset),
