@@ -7,14 +7,23 @@
 mod support;
 
 use arborcam::document::Document;
+use arborcam::model::Skeleton;
+use arborcam::pipeline::reshape;
 use arborcam::runtime::in_parallel;
-use arborcam::views::{Likeness, Offspring, OffspringMotion, OffspringOptions, Parent};
+use arborcam::shape::{Angles, Envelope, envelope_distance};
+use arborcam::views::{
+    Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, example_outline,
+};
+use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Triangles of the wood and of the leaves of the tree that is written.
 const TRIANGLES: u32 = 10_000;
+
+/// Trees that are compared with the example.
+const COMPARED: u64 = 60;
 
 static GO_ON: AtomicBool = AtomicBool::new(false);
 
@@ -23,6 +32,7 @@ fn main() {
     let capture = given.map_or_else(|| support::replayed().to_owned(), PathBuf::from);
     let moving = parent(&capture, OffspringMotion::Example);
     let still = parent(&capture, OffspringMotion::AtRest);
+    compare_in_space(&capture, &still);
     let skeleton_ms = median_ms(60, |k| drop(offspring(&still, k)));
     let motion_ms = median_ms(60, |k| drop(offspring(&moving, k)));
     println!("new skeleton: {skeleton_ms:.1} ms; with motion: {motion_ms:.1} ms (asked: 5 ms)");
@@ -43,6 +53,32 @@ fn main() {
         let took_s = from.elapsed().as_secs_f64();
         println!("1,000 skeletons, {threads} threads: {took_s:.1} s (asked: 5 s on two)");
     }
+}
+
+/// How well new trees fill the example's envelope (D of eq. 5, its D as a share of theirs), and how
+/// likely their angles are (eq. 4, each with the usual angle of its own tree): medians, as shares of
+/// the example's, which is stood up in the same way.
+fn compare_in_space(capture: &Path, parent: &Parent) {
+    let document = Document::read(capture, 0.0).expect("a capture");
+    let config = &document.note.config;
+    let outline = example_outline(&document).expect("an outline");
+    let example = reshape(&document.skeleton, outline, config);
+    let places: Vec<Point3<f64>> = example.nodes.iter().map(|n| n.position).collect();
+    let envelope = Envelope::of_filmed(config.shape.envelope, outline, example.foot_px, &places);
+    let distance_px =
+        |tree: &Skeleton| envelope_distance(tree, &envelope, config.shape.attractors as usize);
+    let likelihood = |tree: &Skeleton| Angles::of(tree, &config.shape).likelihood(tree);
+    let (mut fillings, mut plausibilities) = (Vec::new(), Vec::new());
+    for k in 1..=COMPARED {
+        let tree = offspring(parent, k).skeleton;
+        fillings.push(distance_px(&example) / distance_px(&tree));
+        plausibilities.push(likelihood(&tree) / likelihood(&example));
+    }
+    println!(
+        "filling of the envelope: {:.2} of the example's (asked: 0.9); plausibility of the angles: {:.2} (asked: 1.0)",
+        median(fillings),
+        median(plausibilities)
+    );
 }
 
 fn parent(capture: &Path, motion: OffspringMotion) -> Parent {
@@ -71,6 +107,10 @@ fn median_ms(times: u64, mut work: impl FnMut(u64)) -> f64 {
         work(k);
         all_ms.push(1e3 * from.elapsed().as_secs_f64());
     }
-    all_ms.sort_by(f64::total_cmp);
-    all_ms[all_ms.len() / 2]
+    median(all_ms)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }

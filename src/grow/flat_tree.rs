@@ -359,8 +359,15 @@ struct Way {
     number: usize,
     /// Of the branch that leads on, and of the other.
     ends_px: [Point2<f64>; 2],
-    /// How probable it is, but for a factor that all have.
-    weight: f64,
+    /// Of its directions.
+    likelihood: f64,
+}
+
+impl Way {
+    /// Of its branches, which leave from `apex`, px.
+    fn lengths_px(&self, apex: Point2<f64>) -> [f64; 2] {
+        self.ends_px.map(|end| (end - apex).norm())
+    }
 }
 
 impl<'a> Growth<'a> {
@@ -449,19 +456,26 @@ impl<'a> Growth<'a> {
         from: Range<usize>,
         least_likelihood: f64,
     ) -> Option<Way> {
-        let mut best: Option<Way> = None;
+        let apex = self.tree[leaf].position_px;
+        let mut ways = Vec::with_capacity(2 * from.len());
         for number in from {
             let bifurcation = &bifurcations[number];
             for is_mirrored in [false, true] {
-                let way = self.way(leaf, number, bifurcation, is_mirrored, least_likelihood);
-                if let Some(way) = way
-                    && best.is_none_or(|best| way.weight > best.weight)
-                {
-                    best = Some(way);
-                }
+                ways.extend(self.way(leaf, number, bifurcation, is_mirrored, least_likelihood));
             }
         }
-        best
+        let lengths_px = ways.iter().flat_map(|way| way.lengths_px(apex));
+        let surroundings = self.space.around(apex, lengths_px.fold(0.0, f64::max));
+        let mut best: Option<(f64, Way)> = None;
+        for way in ways {
+            let gain_px = surroundings.gain(apex, way.ends_px) + self.gain_floor_px;
+            let wood_px: f64 = way.lengths_px(apex).iter().sum();
+            let weight = gain_px / wood_px.sqrt() * way.likelihood;
+            if best.is_none_or(|(most, _)| weight > most) {
+                best = Some((weight, way));
+            }
+        }
+        best.map(|(_, way)| way)
     }
 
     /// With a bifurcation whose left branch leads on, or with its mirror image. `None` where it leaves
@@ -488,12 +502,6 @@ impl<'a> Growth<'a> {
         } else {
             branches(bifurcation, apex, stem)
         };
-        let fits = ends_px
-            .iter()
-            .all(|end| (end - apex).norm() >= self.shortest_px && self.space.holds(apex, *end));
-        if !fits {
-            return None;
-        }
         let foot_px = self.tree[0].position_px;
         let [leading, other] = ends_px.map(|end| outward(foot_px, apex, end));
         let leading = self.example.leading.likelihood(leading);
@@ -501,12 +509,13 @@ impl<'a> Growth<'a> {
         if leading.min(other) < least_likelihood {
             return None;
         }
-        let gain_px = self.space.gain(apex, ends_px) + self.gain_floor_px;
-        let wood_px: f64 = ends_px.iter().map(|end| (end - apex).norm()).sum();
-        Some(Way {
+        let fits = ends_px
+            .iter()
+            .all(|end| (end - apex).norm() >= self.shortest_px && self.space.holds(apex, *end));
+        fits.then_some(Way {
             number,
             ends_px,
-            weight: gain_px / wood_px.sqrt() * leading * other,
+            likelihood: leading * other,
         })
     }
 

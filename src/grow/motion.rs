@@ -7,7 +7,8 @@ use crate::random::Generator;
 use crate::signal::interpolation::linear;
 use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::num_complex::Complex;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -130,13 +131,13 @@ impl MotionStatistics {
     pub fn sample(&self, skeleton: &Skeleton, most_rad: f64, random: &mut Generator) -> Vec<Pose> {
         let branches = skeleton.moving_branches();
         let levels = LevelShares::of(skeleton);
-        let circle = Circle::of(self.steps);
+        let mut synthesis = Synthesis::of(self.steps);
         let mut turns: Vec<Vec<Vector3<f64>>> = Vec::with_capacity(branches.len());
         for branch in &branches {
             let node = &skeleton.nodes[branch.node.index()];
             let share = levels.of_node(branch.node);
             let into_plane = Rotation3::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
-            let own = self.loop_of(share, &circle, random);
+            let own = self.loop_of(share, &mut synthesis, random);
             let farthest = own.iter().map(Vector3::norm).fold(0.0, f64::max);
             let scale = if farthest > most_rad {
                 most_rad / farthest
@@ -157,7 +158,7 @@ impl MotionStatistics {
     fn loop_of(
         &self,
         share_of_deepest: f64,
-        circle: &Circle,
+        synthesis: &mut Synthesis,
         random: &mut Generator,
     ) -> Vec<Vector3<f64>> {
         let mut turns = vec![Vector3::zeros(); self.steps];
@@ -171,8 +172,8 @@ impl MotionStatistics {
                 cosines: drawn(&spectrum.cosines, strength.cosines[axis], random),
                 sines: drawn(&spectrum.sines, strength.sines[axis], random),
             };
-            for (k, turn) in turns.iter_mut().enumerate() {
-                turn[axis] = amplitudes.at(k, circle);
+            for (turn, angle) in turns.iter_mut().zip(synthesis.angles(&amplitudes)) {
+                turn[axis] = *angle;
             }
         }
         turns
@@ -190,36 +191,38 @@ fn drawn(shares: &Option<Dirichlet>, strength: f64, random: &mut Generator) -> V
     amplitudes
 }
 
-impl Amplitudes {
-    /// The angle at step `k` of a loop, radians.
-    fn at(&self, k: usize, circle: &Circle) -> f64 {
-        let mut sum = 0.0;
-        for (bin, a) in self.cosines.iter().enumerate() {
-            sum += a * circle.cosines[circle.step(bin, k)];
-        }
-        for (bin, b) in self.sines.iter().enumerate() {
-            sum += b * circle.sines[circle.step(bin, k)];
-        }
-        sum
-    }
+/// From amplitudes to the angles of a loop.
+struct Synthesis {
+    inverse: Arc<dyn ComplexToReal<f64>>,
+    spectrum: Vec<Complex<f64>>,
+    angles: Vec<f64>,
 }
 
-/// Cosine and sine at each of the even steps once round a circle.
-struct Circle {
-    cosines: Vec<f64>,
-    sines: Vec<f64>,
-}
-
-impl Circle {
+impl Synthesis {
     fn of(steps: usize) -> Self {
-        let angles = (0..steps).map(|k| TAU * k as f64 / steps as f64);
-        let (sines, cosines) = angles.map(f64::sin_cos).unzip();
-        Self { cosines, sines }
+        let inverse = RealFftPlanner::new().plan_fft_inverse(steps);
+        Self {
+            spectrum: inverse.make_input_vec(),
+            angles: inverse.make_output_vec(),
+            inverse,
+        }
     }
 
-    /// Where the frequency `bin` is at step `k` of a loop.
-    fn step(&self, bin: usize, k: usize) -> usize {
-        (bin + 1) * k % self.cosines.len()
+    /// The angle at each step of a loop, radians.
+    fn angles(&mut self, amplitudes: &Amplitudes) -> &[f64] {
+        self.spectrum.fill(Complex::default());
+        for (bin, a) in self.spectrum[1..].iter_mut().zip(&amplitudes.cosines) {
+            bin.re = 0.5 * a;
+        }
+        for (bin, b) in self.spectrum[1..].iter_mut().zip(&amplitudes.sines) {
+            bin.im = -0.5 * b;
+        }
+        let (spectrum, angles) = (&mut self.spectrum, &mut self.angles);
+        if self.inverse.process(spectrum, angles).is_err() {
+            // A transform of other sizes than those that it was made for; not reached.
+            angles.fill(0.0);
+        }
+        &self.angles
     }
 }
 

@@ -1,8 +1,8 @@
 //! Another shape in space for a tree that has been measured.
 
 use crate::config::Config;
-use crate::model::{ClusterId, NodeName, Outline, Skeleton};
-use crate::shape::{Drawn, Topiary, TopiaryError};
+use crate::model::{ClusterId, NodeId, NodeName, Outline, Skeleton};
+use crate::shape::{Drawn, Terms, Topiary, TopiaryError};
 use crate::solve::{assign_radii, in_depth_of};
 use crate::{shape, skeleton};
 
@@ -14,21 +14,8 @@ pub const MOST_RESHAPED: usize = 4096;
 /// their names; copies get names that no node had before.
 pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     let movers = old.foot_and_branches();
-    let mut flat: Vec<skeleton::Node2d> = Vec::with_capacity(movers.len());
-    let mut tracks: Vec<u32> = Vec::with_capacity(movers.len());
-    for (i, mover) in movers.iter().enumerate() {
-        let node = &old.nodes[mover.index()];
-        let carrier = old.moving_parent(*mover);
-        flat.push(skeleton::Node2d {
-            parent: carrier.and_then(|c| movers.iter().position(|m| *m == c)),
-            level: node.level,
-            cluster: i.checked_sub(1).map(|k| ClusterId(k as u32)),
-            position_px: old.image_from_model(&node.position),
-            certainty: node.certainty,
-        });
-        tracks.push(node.n_tracks);
-    }
-    let mut straight = shape::build(&flat, &tracks, outline, &config.shape);
+    let Flat { nodes, tracks } = Flat::of(old, &movers);
+    let mut straight = shape::build(&nodes, &tracks, outline, &config.shape);
     let unused = old
         .nodes
         .iter()
@@ -49,6 +36,41 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     }
     let next = unused.saturating_add(straight.nodes.len() as u32);
     in_depth_of(&straight, old, next)
+}
+
+/// How the terms of the push weigh where the tree stands as `config` says.
+pub fn push_terms(skeleton: &Skeleton, outline: &Outline, config: &Config) -> Terms {
+    let Flat { nodes, tracks } = Flat::of(skeleton, &skeleton.foot_and_branches());
+    shape::tuned_terms(&nodes, &tracks, outline, &config.shape)
+}
+
+/// The measured nodes of a tree in the picture, and how many points are on each.
+struct Flat {
+    nodes: Vec<skeleton::Node2d>,
+    tracks: Vec<u32>,
+}
+
+impl Flat {
+    /// Of a tree whose foot and branches are `movers`.
+    fn of(tree: &Skeleton, movers: &[NodeId]) -> Self {
+        let mut flat = Self {
+            nodes: Vec::with_capacity(movers.len()),
+            tracks: Vec::with_capacity(movers.len()),
+        };
+        for (i, mover) in movers.iter().enumerate() {
+            let node = &tree.nodes[mover.index()];
+            let carrier = tree.moving_parent(*mover);
+            flat.nodes.push(skeleton::Node2d {
+                parent: carrier.and_then(|c| movers.iter().position(|m| *m == c)),
+                level: node.level,
+                cluster: i.checked_sub(1).map(|k| ClusterId(k as u32)),
+                position_px: tree.image_from_model(&node.position),
+                certainty: node.certainty,
+            });
+            flat.tracks.push(node.n_tracks);
+        }
+        flat
+    }
 }
 
 /// Cuts the tree to a drawn shape; radii follow from what is left.

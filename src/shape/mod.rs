@@ -35,7 +35,7 @@ pub use limb::{CenterlineSample, Limb};
 pub use limbs::{limbs, thicken};
 pub use measure::{PushFigures, side_symmetry};
 pub use planes::copy_to_planes;
-pub use prototype::{Prototype, build};
+pub use prototype::{Prototype, build, build_like, tuned_terms};
 pub use push::{PositionPrior, Terms, envelope_distance, push, push_on};
 pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX};
 pub use room::{Silhouette, room};

@@ -2,6 +2,7 @@
 
 use super::envelope::Envelope;
 use super::planes::{copy_to_planes, model_from_image};
+use super::push::{Terms, push};
 use super::term_weights::tune_term_weights;
 use super::trunk::trunk;
 use crate::config;
@@ -24,6 +25,31 @@ pub fn build(
     } = Prototype::of(flat, tracks, outline, settings);
     tune_term_weights(&mut skeleton, &trunk, &envelope, settings);
     skeleton
+}
+
+/// How the two terms weigh for the tree that [`build`] makes of the same.
+pub fn tuned_terms(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    settings: &config::Shape,
+) -> Terms {
+    let mut it = Prototype::of(flat, tracks, outline, settings);
+    tune_term_weights(&mut it.skeleton, &it.trunk, &it.envelope, settings)
+}
+
+/// As [`build`], with weights of the two terms that are known from another tree of the same form:
+/// a single push.
+pub fn build_like(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    settings: &config::Shape,
+    terms: Terms,
+) -> Skeleton {
+    let mut it = Prototype::of(flat, tracks, outline, settings);
+    push(&mut it.skeleton, &it.trunk, &it.envelope, settings, terms);
+    it.skeleton
 }
 
 /// What is pushed: copies on their planes, and what bounds them.

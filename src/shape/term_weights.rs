@@ -37,28 +37,52 @@ const fn both(weight: f64, gain_floor: f64, spread_first: bool) -> Terms {
 
 /// Pushes by both terms, weighed so that neither gives up more than it must: of the trees that are
 /// tried the one whose worse figure is best, held against what the paper's single traversal
-/// achieves with either term alone.
+/// achieves with either term alone. Gives the weights.
 pub fn tune_term_weights(
     skeleton: &mut Skeleton,
     trunk: &[bool],
     envelope: &Envelope,
     settings: &config::Shape,
-) {
+) -> Terms {
     let baseline = Baseline::of(skeleton, trunk, envelope, settings);
-    let mut best: Option<(f64, Skeleton)> = None;
-    for terms in TRIED {
-        let mut pushed = skeleton.clone();
-        push(&mut pushed, trunk, envelope, settings, terms);
-        let worse = baseline.score(&pushed).worse();
-        if best.as_ref().is_none_or(|(before, _)| worse > *before) {
-            best = Some((worse, pushed));
-        }
-        if best.as_ref().is_some_and(|(worse, _)| *worse >= ENOUGH) {
+    let [first, others @ ..] = TRIED;
+    let mut best = Tried::push(skeleton, trunk, envelope, settings, first, &baseline);
+    for terms in others {
+        if best.worse >= ENOUGH {
             break;
         }
+        let tried = Tried::push(skeleton, trunk, envelope, settings, terms, &baseline);
+        if tried.worse > best.worse {
+            best = tried;
+        }
     }
-    if let Some((_, pushed)) = best {
-        *skeleton = pushed;
+    *skeleton = best.pushed;
+    best.terms
+}
+
+/// A tree pushed by one choice of the weights, and its worse figure.
+struct Tried {
+    terms: Terms,
+    pushed: Skeleton,
+    worse: f64,
+}
+
+impl Tried {
+    fn push(
+        skeleton: &Skeleton,
+        trunk: &[bool],
+        envelope: &Envelope,
+        settings: &config::Shape,
+        terms: Terms,
+        baseline: &Baseline,
+    ) -> Self {
+        let mut pushed = skeleton.clone();
+        push(&mut pushed, trunk, envelope, settings, terms);
+        Self {
+            terms,
+            worse: baseline.score(&pushed).worse(),
+            pushed,
+        }
     }
 }
 

@@ -11,8 +11,9 @@ use crate::grow::{
     sample_sway,
 };
 use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Unidentified};
-use crate::pipeline::{MOST_RESHAPED, reshape, stand_grown};
+use crate::pipeline::{MOST_RESHAPED, push_terms, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
+use crate::shape::Terms;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -64,8 +65,15 @@ pub struct Parent {
 
 /// What was learned of its form.
 enum Form {
-    Forks(ForkStatistics),
-    Branches { angles: SideAngles, how: Resampling },
+    Forks {
+        statistics: ForkStatistics,
+        /// Of the push that stands the example up.
+        terms: Terms,
+    },
+    Branches {
+        angles: SideAngles,
+        how: Resampling,
+    },
 }
 
 /// What was learned of its motion.
@@ -102,14 +110,17 @@ impl Parent {
         }
         let own = outline_of(&document)?.clone();
         let region = options.region.unwrap_or_else(|| own.clone());
+        for_new_trees(&mut config.shape, &options.likeness);
         let form = match options.likeness {
-            Likeness::Forks => Form::Forks(ForkStatistics::of(&document.skeleton)?),
+            Likeness::Forks => Form::Forks {
+                statistics: ForkStatistics::of(&document.skeleton)?,
+                terms: push_terms(&document.skeleton, &own, &config),
+            },
             Likeness::Branches(how) => Form::Branches {
                 angles: SideAngles::of(&document.skeleton),
                 how,
             },
         };
-        for_new_trees(&mut config.shape, &options.likeness);
         let motion = match options.motion {
             OffspringMotion::Example => {
                 let learned = MotionStatistics::of(&document.skeleton, &document.poses);
@@ -191,12 +202,12 @@ impl Parent {
     fn skeleton(&self, config: &Config, random: &mut Generator) -> Result<Skeleton, PrepareError> {
         let example = &self.document.skeleton;
         match &self.form {
-            Form::Forks(statistics) => {
+            Form::Forks { statistics, terms } => {
                 let foot_px = example.foot_px;
                 let flat = grow_flat(statistics, &self.region, foot_px, self.scale, random)?;
                 let trunk_px = example.nodes.get(1).map_or(1.0, |top| top.radius);
                 let trunk_px = trunk_px * self.scale;
-                Ok(stand_grown(&flat, &self.region, trunk_px, config))
+                Ok(stand_grown(&flat, &self.region, *terms, trunk_px, config))
             }
             Form::Branches { angles, how } => {
                 let turned = resample(example, angles, how, random).map_err(|nothing| {
@@ -213,7 +224,7 @@ impl Parent {
     fn sway(&self, new: &Skeleton, random: &mut Generator) -> Vec<Swaying> {
         let (example, known) = (&self.document.skeleton, &self.document.sway);
         match &self.form {
-            Form::Forks(_) => sample_sway(example, known, new, random),
+            Form::Forks { .. } => sample_sway(example, known, new, random),
             Form::Branches { .. } => {
                 // The same branches, and copies that nothing was measured on.
                 let mut sway = known.clone();
