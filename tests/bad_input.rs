@@ -1,6 +1,10 @@
 //! What bad input gets: the exit status of the contract, one line that names the thing and says
 //! what to do, and nothing left behind but what was asked for.
 
+#[path = "support/small_disk.rs"]
+mod small_disk;
+
+use small_disk::SmallDisk;
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
@@ -715,34 +719,18 @@ fn what_may_not_be_read_or_written_says_what_to_do() {
     }
 }
 
-/// A disk of 200 kB, mounted for the test.
-struct TinyDisk(PathBuf);
-
-impl Drop for TinyDisk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(&self.0).status();
-    }
-}
-
 #[test]
 fn a_full_disk_is_told_and_nothing_is_left_on_it() {
     let mut run = Run::new(
         "replay {f}/short.mkv --outline {outline} --fast --headless --config {f}/eager.toml",
     );
-    let place = tempfile::tempdir().expect("tempdir");
-    let mount = Command::new("mount")
-        .args(["-t", "tmpfs", "-o", "size=200k", "arborcam"])
-        .arg(place.path())
-        .output();
-    if !mount.is_ok_and(|o| o.status.success()) {
-        eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
+    let Some(disk) = SmallDisk::mount("200k") else {
         return;
-    }
-    let disk = TinyDisk(place.path().to_owned());
+    };
     let output = run
         .command
         .arg("--out")
-        .arg(disk.0.join("out"))
+        .arg(disk.path("out"))
         .output()
         .expect("arborcam starts");
     check(
@@ -754,7 +742,7 @@ fn a_full_disk_is_told_and_nothing_is_left_on_it() {
         Nothing,
     );
     assert_eq!(
-        fs::read_dir(&disk.0).expect("disk").count(),
+        fs::read_dir(disk.dir()).expect("disk").count(),
         0,
         "nothing is left on the disk"
     );

@@ -1,5 +1,7 @@
 //! CSV, capture.json and the folder that they go to.
 
+#[path = "support/small_disk.rs"]
+mod small_disk;
 mod synthetic;
 
 use arborcam::config::Config;
@@ -11,6 +13,7 @@ use arborcam::model::{
     TrackSet, Unidentified,
 };
 use nalgebra::Point2;
+use small_disk::SmallDisk;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -285,26 +288,14 @@ fn a_full_disk_is_named_by_the_row_writers() {
 /// Needs a small file system of its own, which only root can mount.
 #[test]
 fn a_full_disk_leaves_no_half_written_folder() {
-    let home = tempfile::tempdir().unwrap();
-    let mount = |command: &str, args: &[&str]| {
-        std::process::Command::new(command)
-            .args(args)
-            .output()
-            .is_ok_and(|o| o.status.success())
-    };
-    let at = home.path().to_str().unwrap().to_string();
-    if !mount("mount", &["-t", "tmpfs", "-o", "size=256k", "tmpfs", &at]) {
-        eprintln!(
-            "SKIPPED a_full_disk_leaves_no_half_written_folder: no right to mount a small file system"
-        );
+    let Some(disk) = SmallDisk::mount("256k") else {
         return;
-    }
-    let folder = OutputFolder::create(&home.path().join("oak")).unwrap();
+    };
+    let folder = OutputFolder::create(&disk.path("oak")).unwrap();
     folder.write("capture.json", &[b' '; 100_000]).unwrap();
     let error = folder.write("tree.glb", &vec![0; 1_000_000]).unwrap_err();
     drop(folder);
-    let left = names_in(home.path());
-    assert!(mount("umount", &[&at]));
+    let left = names_in(disk.dir());
     assert_eq!(left, [""; 0]);
     assert!(
         matches!(

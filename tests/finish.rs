@@ -1,7 +1,10 @@
 //! A run that was cut: what was filmed is kept, and `arborcam finish` completes it.
 
+#[path = "support/small_disk.rs"]
+mod small_disk;
 mod support;
 
+use small_disk::SmallDisk;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -156,41 +159,12 @@ fn a_finished_log_is_the_capture_of_the_run() {
     }
 }
 
-/// A disk of 100 MB.
-struct SmallDisk(TempDir);
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(self.0.path()).status();
-    }
-}
-
-impl SmallDisk {
-    /// `None` where only root may mount one.
-    fn mount() -> Option<Self> {
-        let dir = tempfile::tempdir().expect("tempdir");
-        let mount = Command::new("mount")
-            .args(["-t", "tmpfs", "-o", "size=100m", "arborcam"])
-            .arg(dir.path())
-            .output();
-        if !mount.is_ok_and(|o| o.status.success()) {
-            eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
-            return None;
-        }
-        Some(Self(dir))
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// A run that has filmed for ten seconds.
-    fn filming(&self) -> Run {
-        let run = Run::start(&self.path("out"), &[]);
-        run.wait_until_it_films();
-        std::thread::sleep(Duration::from_secs(10));
-        run
-    }
+/// A run that has filmed on the disk for ten seconds.
+fn filming(disk: &SmallDisk) -> Run {
+    let run = Run::start(&disk.path("out"), &[]);
+    run.wait_until_it_films();
+    std::thread::sleep(Duration::from_secs(10));
+    run
 }
 
 /// Fills the disk to its last page.
@@ -201,10 +175,10 @@ fn fill(filler: &mut fs::File) {
 /// Something else fills the disk while a tree is filmed: the results have their space.
 #[test]
 fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
-    let Some(disk) = SmallDisk::mount() else {
+    let Some(disk) = SmallDisk::mount("100m") else {
         return;
     };
-    let run = disk.filming();
+    let run = filming(&disk);
     let out = run.out.clone();
     fill(&mut fs::File::create(disk.path("filler")).expect("filler"));
     let unfinished = run.unfinished();
@@ -221,10 +195,10 @@ fn a_disk_that_fills_up_ends_the_film_and_not_the_capture() {
 /// is there when the disk has room again.
 #[test]
 fn a_disk_that_stays_full_costs_nothing_that_was_filmed() {
-    let Some(disk) = SmallDisk::mount() else {
+    let Some(disk) = SmallDisk::mount("100m") else {
         return;
     };
-    let run = disk.filming();
+    let run = filming(&disk);
     let out = run.out.clone();
     let ended = AtomicBool::new(false);
     let filler_path = disk.path("filler");

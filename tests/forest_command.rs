@@ -1,5 +1,7 @@
 //! `arborcam grow --forest`: what a user gets, what others make of it, and what bad input gets.
 
+#[path = "support/small_disk.rs"]
+mod small_disk;
 mod support;
 #[path = "support/tools.rs"]
 mod tools;
@@ -7,6 +9,7 @@ mod tools;
 use arborcam::document::{Document, ForestDocument};
 use gltf::Gltf;
 use serde_json::{Value, json};
+use small_disk::SmallDisk;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -449,6 +452,26 @@ fn ctrl_c_keeps_what_is_finished() {
     assert_eq!(run.wait().expect("it ends").code(), Some(STOPPED));
     let there = names_in(&out);
     assert!((3..64).contains(&there.len()), "{there:?}");
+    for name in there {
+        assert!(name.starts_with("tree-"), "{name}");
+        Document::read(&out.join(name), 60.0).expect("a whole tree");
+    }
+}
+
+/// A full disk keeps the trees that are finished, and no half of one, nor half a scene.
+#[test]
+fn a_full_disk_keeps_what_is_finished() {
+    let Some(disk) = SmallDisk::mount("12m") else {
+        return;
+    };
+    let out = disk.path("forest");
+    let output = grow(&out, &["--forest", "--count", "99", "--templates", "64"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(FAILED), "{said}");
+    assert!(said.contains("disk is full"), "{said}");
+    assert_eq!(names_in(disk.dir()), ["forest"]);
+    let there = names_in(&out);
+    assert!((1..64).contains(&there.len()), "{there:?}");
     for name in there {
         assert!(name.starts_with("tree-"), "{name}");
         Document::read(&out.join(name), 60.0).expect("a whole tree");
