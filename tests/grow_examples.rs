@@ -1,11 +1,14 @@
 //! `arborcam grow` with examples that are no captures: drawings and modelled trees; and what bad
 //! ones get, a full disk and Ctrl-C in the middle among them.
 
+#[path = "support/small_disk.rs"]
+mod small_disk;
 mod support;
 
 use arborcam::document::Document;
 use arborcam::import::{FlatModel, read_model};
 use arborcam::model::{NodeId, Skeleton};
+use small_disk::SmallDisk;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -56,6 +59,7 @@ fn models() -> &'static Path {
         let skeleton = &Document::read(&at("tree"), 0.0).expect("tree").skeleton;
         fs::write(at("lines.obj"), as_obj(skeleton)).expect("write");
         fs::write(at("edges.ply"), as_ply(skeleton)).expect("write");
+        fs::write(at("segments.txt"), as_treefile(skeleton)).expect("write");
         fs::write(at("nodes.gltf"), as_gltf(skeleton)).expect("write");
         dir
     });
@@ -93,6 +97,17 @@ fn as_ply(skeleton: &Skeleton) -> String {
         if let Some(parent) = node.parent {
             writeln!(file, "{} {i}", parent.0).expect("text");
         }
+    }
+    file
+}
+
+/// With z up, as RayCloudTools write it.
+fn as_treefile(skeleton: &Skeleton) -> String {
+    let mut file = "# Tree file.\nheight, x,y,z,radius,parent_id\n1".to_owned();
+    for node in &skeleton.nodes {
+        let [x, y, z] = node.position.into();
+        let parent = node.parent.map_or(-1, |parent| i64::from(parent.0));
+        write!(file, ", {x},{},{y},{},{parent}", -z, node.radius).expect("text");
     }
     file
 }
@@ -137,12 +152,12 @@ fn forks_and_tips(skeleton: &Skeleton) -> [usize; 2] {
     [count(|n| n > 1), count(|n| n == 0)]
 }
 
-/// The same tree in three formats is the same example.
+/// The same tree in four formats is the same example.
 #[test]
-fn lines_edges_and_nodes_make_the_same_trees() {
+fn lines_edges_segments_and_nodes_make_the_same_trees() {
     let dir = tempfile::tempdir().expect("tempdir");
     let mut tables = Vec::new();
-    for name in ["lines.obj", "edges.ply", "nodes.gltf"] {
+    for name in ["lines.obj", "edges.ply", "segments.txt", "nodes.gltf"] {
         let out = dir.path().join(name);
         let tree = grown(&models().join(name), &out, &["--motion", "none"]);
         assert!(
@@ -154,10 +169,11 @@ fn lines_edges_and_nodes_make_the_same_trees() {
         tables.push((name, table, tree));
     }
     assert!(tables[0].1 == tables[1].1, "OBJ and PLY differ");
+    assert!(tables[0].1 == tables[2].1, "OBJ and treefile differ");
     // Its places are floats, in metres.
-    let [obj, gltf] = [0, 2].map(|k| forks_and_tips(&tables[k].2.skeleton));
+    let [obj, gltf] = [0, 3].map(|k| forks_and_tips(&tables[k].2.skeleton));
     assert_eq!(obj, gltf);
-    assert!(tables[2].2.metres_per_px() > 0.0 && tables[0].2.metres_per_px() == 0.0);
+    assert!(tables[3].2.metres_per_px() > 0.0 && tables[0].2.metres_per_px() == 0.0);
 }
 
 #[test]
@@ -342,6 +358,8 @@ fn bad_examples_get_one_line_and_leave_nothing() {
         ("few.obj", format!("{fork}l 1 2 3\nl 2 4\n").into_bytes(), "1 forks"),
         ("odd.ply", b"ply\nformat ascii 1.0\nend_header\n".to_vec(), "no skeleton"),
         ("odd.csv", b"a,b\n1,2\n".to_vec(), "no column"),
+        ("odd.txt", b"a,b\n1,2\n".to_vec(), "no treefile"),
+        ("two.txt", b"x,y,z,parent_id\n0,0,0,-1\n0,0,0,-1\n".to_vec(), "2 trees"),
         ("tree.stl", b"solid".to_vec(), "does not say"),
         ("few.svg", fs::read(DRAWING).expect("drawing")[..420].to_vec(), "damaged"),
     ];
@@ -409,28 +427,12 @@ fn what_is_finished_stays_when_it_is_stopped() {
     assert!((3..100_000).contains(&only_whole_trees(&out)));
 }
 
-/// A small disk, mounted for the test.
-struct SmallDisk(PathBuf);
-
-impl Drop for SmallDisk {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(&self.0).status();
-    }
-}
-
 #[test]
 fn what_is_finished_stays_when_the_disk_is_full() {
-    let place = tempfile::tempdir().expect("tempdir");
-    let mount = Command::new("mount")
-        .args(["-t", "tmpfs", "-o", "size=12m", "arborcam"])
-        .arg(place.path())
-        .output();
-    if !mount.is_ok_and(|o| o.status.success()) {
-        eprintln!("SKIPPED: full disk: a small disk can be mounted by root only");
+    let Some(disk) = SmallDisk::mount("12m") else {
         return;
-    }
-    let disk = SmallDisk(place.path().to_owned());
-    let out = disk.0.join("trees");
+    };
+    let out = disk.path("trees");
     let output: Output = command(
         &["grow", text(&models().join("tree")), "--count", "1000"],
         &out,
@@ -442,5 +444,5 @@ fn what_is_finished_stays_when_the_disk_is_full() {
     assert!(said.contains("disk is full"), "{said}");
     assert!((1..1000).contains(&only_whole_trees(&out)));
     // The one that did not fit has left its space.
-    assert_eq!(names_in(&disk.0), ["trees"]);
+    assert_eq!(names_in(disk.dir()), ["trees"]);
 }

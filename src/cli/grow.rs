@@ -31,7 +31,7 @@ const MOST_THREADS: i64 = 256;
 pub struct GrowArgs {
     /// The example: the folder of a capture, of a sketch or of a grown tree, or a file: a drawing
     /// (.svg, .json) or a modelled tree (.glb, .gltf; the lines of an .obj or .ply; .csv for
-    /// cylinders).
+    /// cylinders; .txt for a treefile of RayCloudTools).
     example: PathBuf,
     /// Number of new trees; with --forest the number of trees in it.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_TREES))]

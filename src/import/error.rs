@@ -1,7 +1,7 @@
 //! Why a file gives no tree.
 
 const NO_SKELETON: &str = "give a glTF with joints or nodes in a tree, an OBJ with lines, a PLY with \
-                           edges, or a table of cylinders";
+                           edges, a table of cylinders, or a treefile";
 
 /// Each message is one line that says what to do. The name of the file is put before it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -4,7 +4,7 @@
 //! ([`joined`]), which is stood up in space as a captured one is (Li 2011 sect. 6 and fig. 9).
 //!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
-//! an OBJ, PLY or table of cylinders. It is made flat ([`FlatModel`]).
+//! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
 
 mod cylinders;
 mod error;
@@ -23,6 +23,7 @@ mod sketch_json;
 mod svg;
 mod svg_path;
 mod svg_place;
+mod treefile;
 
 pub use error::ImportError;
 pub use flat_tree::FlatTree;

@@ -3,12 +3,12 @@
 use super::error::ImportError;
 use super::gltf_skeleton::{self, MovingModel};
 use super::model_tree::ModelTree;
-use super::{cylinders, obj, ply};
+use super::{cylinders, obj, ply, treefile};
 use std::path::Path;
 
 /// Reads a modelled tree in the `bytes` of the file at `path`, whose name says its format: `.glb` and
-/// `.gltf`, `.obj`, `.ply`, and `.csv` for a table of cylinders. Files that a glTF refers to are read
-/// from beside it.
+/// `.gltf`, `.obj`, `.ply`, `.csv` for a table of cylinders, and `.txt` for a treefile. Files that a
+/// glTF refers to are read from beside it.
 ///
 /// # Errors
 /// It is of another format or damaged, or holds no skeleton that is a tree.
@@ -22,10 +22,11 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
         "obj" => obj::edges(&String::from_utf8_lossy(bytes))?,
         "ply" => ply::edges(bytes)?,
         "csv" => cylinders::edges(bytes)?,
+        "txt" => treefile::edges(&String::from_utf8_lossy(bytes))?,
         _ => {
             return Err(ImportError::unsupported(
                 "its name does not say what it is",
-                "give a folder of a tree, or .svg, .json, .glb, .gltf, .obj, .ply or .csv",
+                "give a folder of a tree, or .svg, .json, .glb, .gltf, .obj, .ply, .csv or .txt",
             ));
         }
     };
