@@ -281,8 +281,7 @@ fn outward(foot_px: Point2<f64>, from_px: Point2<f64>, to_px: Point2<f64>) -> f6
 /// mirror images, which stand in as many directions, the most probable is taken (eq. 2): it brings
 /// the tree nearer to the places of the region (eq. 6) with little wood, and its branches go away
 /// from the foot as the example's do. One that would leave the region is not taken, nor one that
-/// goes where hardly any of the example does. Those that fit nowhere are tried again at random tips,
-/// at last in any direction.
+/// goes where hardly any of the example does. Those that fit nowhere are tried again at random tips.
 ///
 /// The paper grows at a random leaf. Then nothing says which branch becomes a limb, and limbs led
 /// back along the border of the region.
@@ -321,13 +320,8 @@ fn grown<'a>(mut trunk: Growth<'a>, random: &mut Generator) -> Growth<'a> {
         node: 1,
         forks: example.forks,
     }];
-    for round in 1..=ROUNDS {
-        let least = if round < ROUNDS {
-            LEAST_LIKELIHOOD
-        } else {
-            0.0
-        };
-        trunk.round(leaves, &mut unused, least, random);
+    for _ in 0..ROUNDS {
+        trunk.round(leaves, &mut unused, random);
         leaves = trunk.shared_out(unused.len(), random);
     }
     trunk
@@ -406,7 +400,6 @@ impl<'a> Growth<'a> {
         &mut self,
         mut leaves: Vec<Leaf>,
         unused: &mut Vec<Bifurcation>,
-        least_likelihood: f64,
         random: &mut Generator,
     ) {
         while let Some(leaf) = take_fullest(&mut leaves) {
@@ -417,8 +410,8 @@ impl<'a> Growth<'a> {
             let hand = HAND.min(unused.len());
             let (some, others) = (0..hand, hand..unused.len());
             let way = self
-                .best_way(leaf.node, unused, some, least_likelihood)
-                .or_else(|| self.best_way(leaf.node, unused, others, least_likelihood));
+                .best_way(leaf.node, unused, some)
+                .or_else(|| self.best_way(leaf.node, unused, others));
             let Some(way) = way else { continue };
             unused.swap_remove(way.number);
             let rest = leaf.forks - 1;
@@ -454,14 +447,13 @@ impl<'a> Growth<'a> {
         leaf: usize,
         bifurcations: &[Bifurcation],
         from: Range<usize>,
-        least_likelihood: f64,
     ) -> Option<Way> {
         let apex = self.tree[leaf].position_px;
         let mut ways = Vec::with_capacity(2 * from.len());
         for number in from {
             let bifurcation = &bifurcations[number];
             for is_mirrored in [false, true] {
-                ways.extend(self.way(leaf, number, bifurcation, is_mirrored, least_likelihood));
+                ways.extend(self.way(leaf, number, bifurcation, is_mirrored));
             }
         }
         let lengths_px = ways.iter().flat_map(|way| way.lengths_px(apex));
@@ -486,7 +478,6 @@ impl<'a> Growth<'a> {
         number: usize,
         bifurcation: &Bifurcation,
         is_mirrored: bool,
-        least_likelihood: f64,
     ) -> Option<Way> {
         let apex = self.tree[leaf].position_px;
         let stem = self.tree[self.tree[leaf].parent?].position_px - apex;
@@ -506,7 +497,7 @@ impl<'a> Growth<'a> {
         let [leading, other] = ends_px.map(|end| outward(foot_px, apex, end));
         let leading = self.example.leading.likelihood(leading);
         let other = self.example.others.likelihood(other);
-        if leading.min(other) < least_likelihood {
+        if leading.min(other) < LEAST_LIKELIHOOD {
             return None;
         }
         let fits = ends_px
