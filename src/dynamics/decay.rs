@@ -10,6 +10,8 @@ const LN_DAMPING_SD: f64 = 0.7;
 /// What a step between two frames may be off the one before, times the rate of a mode, for a short
 /// series to tell it.
 const MAX_SERIES_ARGUMENT: f64 = 0.05;
+/// Chains of products that a processor works on at once.
+const CHAINS: usize = 4;
 
 /// One mode: undamped frequency in Hz and damping ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -130,18 +132,23 @@ pub(super) fn damping_penalty(ln_damping: f64) -> f64 {
 /// Weight of that prior in normal equations: one over the variance.
 pub(super) const LN_DAMPING_WEIGHT: f64 = 1.0 / (LN_DAMPING_SD * LN_DAMPING_SD);
 
-/// exp(λ t) at growing times: each value is the one before times a factor, which is most of the
-/// work of a fit.
+/// exp(λ t) at growing times: each value is the one before times a factor, in chains that do not wait
+/// for each other, as the factors are most of the work of a fit.
 pub(super) fn powers(times_s: &[f64], pole: Complex<f64>) -> Vec<Complex<f64>> {
-    let Some(first) = times_s.first() else {
-        return Vec::new();
-    };
-    let mut value = (pole * *first).exp();
-    let mut out = vec![value];
-    each_step(times_s, pole, |factor| {
-        value *= factor;
-        out.push(value);
-    });
+    let mut out = Vec::with_capacity(times_s.len());
+    out.push(Complex::from(1.0));
+    each_step(times_s, pole, |factor| out.push(factor));
+    out.truncate(times_s.len());
+    let of_chain = times_s.len().div_ceil(CHAINS).max(1);
+    for first in (0..out.len()).step_by(of_chain) {
+        out[first] = (pole * times_s[first]).exp();
+    }
+    for after in 1..of_chain {
+        for k in (after..out.len()).step_by(of_chain) {
+            let before = out[k - 1];
+            out[k] *= before;
+        }
+    }
     out
 }
 

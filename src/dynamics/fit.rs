@@ -9,7 +9,7 @@ use crate::signal::gram::{GramCholesky, gram};
 use crate::signal::least_squares::{
     LeastSquares, NormalEquations, ParameterLimits, Stopping, levenberg_marquardt,
 };
-use crate::signal::variable_projection::{Basis, Explained, Slope, Weighted};
+use crate::signal::variable_projection::{Basis, Explained, Slope};
 
 /// When a fit is done.
 const STOPPING: Stopping = Stopping {
@@ -140,11 +140,9 @@ impl Signals {
         let all = basis.columns_and_slopes();
         let of_all = gram(&all);
         for group in &self.groups {
-            let signals = group.values.iter().map(|values| Weighted {
-                values,
-                weight: 1.0,
-            });
-            rss += normal.add_signals(&basis, &group.gram(&of_all, &all), signals);
+            let weights = vec![1.0; group.signals.count()];
+            let products = group.gram(&of_all, &all);
+            rss += normal.add_signals(&basis, &products, &group.signals, &weights);
         }
         let noise = rss / (self.values as f64).max(1.0);
         for (m, prior) in priors.iter().enumerate() {
@@ -213,9 +211,9 @@ impl Signals {
                 let spanned = factored.solve(&on_columns);
                 unspanned.push(group.rest(&slope.values, &all[..n], &spanned));
             }
-            for signal in &group.values {
-                let factors = Explained::new(signal, &all[..n], &factored).factors;
-                let rest = group.rest(signal, &all[..n], &factors);
+            let explained = Explained::new(&group.signals, &all[..n], &factored);
+            for (signal, factors) in group.signals.each().zip(explained.factors_of_each()) {
+                let rest = group.rest(signal, &all[..n], factors);
                 let mut scores = vec![vec![0.0; rest.len()]; parameters];
                 for (slope, values) in basis.slopes.iter().zip(&unspanned) {
                     let factor = factors[slope.column];

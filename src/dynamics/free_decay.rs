@@ -16,6 +16,7 @@ use super::members::{Points, mean_px};
 use super::release::{Onset, RELEASE_SD_FRAMES};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
+use super::sway::UsableFilm;
 use super::swing::Arms;
 use super::whole_decay::{Fundamental, fundamental};
 use crate::bounds::Bounds;
@@ -80,25 +81,25 @@ const MIN_LN_SD: LnDeviations = LnDeviations {
 };
 
 /// The sway of every branch.
-pub(super) fn sways(
-    tree: &BranchTree,
-    film: &Film,
-    members: &[Vec<usize>],
-    trunk: NodeId,
-    onset: &Onset,
-    limits: &SearchLimits,
-    cancel: &CancelToken,
-) -> Vec<Swaying> {
-    let with_points = tree
+pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken) -> Vec<Swaying> {
+    let UsableFilm {
+        film,
+        members,
+        trunk,
+        onset,
+        limits,
+        ..
+    } = usable;
+    let with_motions = tree
         .branches
         .get(trunk.index())
-        .zip(members.get(trunk.index()));
-    let fundamental = with_points.and_then(|(trunk, tracks)| {
-        fundamental(film, tracks, trunk.base_px, onset, limits, cancel)
+        .zip(usable.decaying.as_ref());
+    let fundamental = with_motions.and_then(|(trunk, motions)| {
+        fundamental(motions, film, trunk.base_px, onset, limits, cancel)
     });
     let mut estimator = FreeDecay {
         fundamental,
-        trunk,
+        trunk: *trunk,
         tree,
         film,
         members,
@@ -176,7 +177,9 @@ impl FreeDecay<'_> {
     /// show none. Its own points show it more exactly, but take modes close together for one; in all
     /// points these differ in their shapes.
     fn or_fundamental(&mut self, trunk: &BranchInFilm, by_own_points: Swaying) -> Swaying {
-        let Some(found) = self.fundamental else {
+        // Scaled to like size, rounding would be motion.
+        let is_still = matches!(by_own_points, Err(Unidentified::TooLittleMotion));
+        let Some(found) = self.fundamental.filter(|_| !is_still) else {
             return by_own_points;
         };
         let mode = mode_of(found.mode.mode, &found.mode.ln_sd);
@@ -500,7 +503,7 @@ impl FittedModes {
     }
 
     fn has_modes_that_cancel(&self, fit: &Fit, largest_px: f64) -> bool {
-        let signals: usize = self.signals.groups.iter().map(|g| g.values.len()).sum();
+        let signals: usize = self.signals.groups.iter().map(|g| g.signals.count()).sum();
         let factors = self.signals.factors(fit, signals);
         let mut new = self.ancestors..fit.modes.len();
         new.any(|m| rms(factors.iter().map(|f| f[m].size())) > MAX_FACTOR_SIZE * largest_px)

@@ -8,12 +8,13 @@ use super::decay::{Mode, Start};
 use super::mode_search::mode_grid;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
-use crate::signal::extension::{Extension, Residual};
+use crate::signal::extension::Candidates;
 use crate::signal::gram::{GramCholesky, gram, gram_without};
 use crate::signal::qr::Qr;
-use crate::signal::variable_projection::Explained;
+use crate::signal::variable_projection::{Explained, SignalBlock};
 use crate::signal::vectors::{dot, slices, subtract_scaled};
 use nalgebra::DMatrix;
+use std::cell::OnceCell;
 
 /// Frequencies that a search tries per factor of e.
 const SEARCHED_PER_E: f64 = 24.0;
@@ -27,8 +28,7 @@ pub(super) struct Group {
     lacking: Vec<usize>,
     /// Of the signals, as they were given.
     ids: Vec<usize>,
-    /// In all frames; 0 where they were not seen.
-    pub values: Vec<Vec<f64>>,
+    pub signals: SignalBlock,
 }
 
 /// Signals to be fitted together.
@@ -41,6 +41,8 @@ pub(super) struct Signals {
     /// Number of values in all signals.
     pub values: usize,
     pub frequencies_hz: Bounds,
+    /// The columns of the modes that are tried, where they are the same for every fit.
+    tried: OnceCell<Candidates>,
 }
 
 /// A fit of modes to signals.
@@ -103,24 +105,19 @@ impl Signals {
         moment_sd_s: f64,
         frequencies_hz: Bounds,
     ) -> Self {
-        let mut groups: Vec<Group> = Vec::new();
+        let mut seen_alike: Vec<(Vec<usize>, Vec<usize>)> = Vec::new();
         for (id, signal) in signals.iter().enumerate() {
-            let (seen, lacking): (Vec<usize>, Vec<usize>) =
-                (0..times_s.len()).partition(|&k| signal[k].is_finite());
-            let mut values = signal.clone();
-            lacking.iter().for_each(|&k| values[k] = 0.0);
-            match groups.iter_mut().find(|g| g.seen == seen) {
-                Some(group) => {
-                    group.ids.push(id);
-                    group.values.push(values);
-                }
-                None => groups.push(Group {
-                    seen,
-                    lacking,
-                    ids: vec![id],
-                    values: vec![values],
-                }),
+            let seen: Vec<usize> = (0..times_s.len())
+                .filter(|&k| signal[k].is_finite())
+                .collect();
+            match seen_alike.iter_mut().find(|(frames, _)| *frames == seen) {
+                Some((_, ids)) => ids.push(id),
+                None => seen_alike.push((seen, vec![id])),
             }
+        }
+        let mut groups: Vec<Group> = Vec::with_capacity(seen_alike.len());
+        for (seen, ids) in seen_alike {
+            groups.push(Group::new(seen, ids, signals));
         }
         let values = groups.iter().map(|g| g.seen.len() * g.ids.len()).sum();
         Self {
@@ -130,6 +127,7 @@ impl Signals {
             groups,
             values,
             frequencies_hz,
+            tried: OnceCell::new(),
         }
     }
 
@@ -179,9 +177,8 @@ impl Signals {
         let mut rss = 0.0;
         for group in &self.groups {
             let factored = GramCholesky::new(&group.gram(&all, &columns), columns.len());
-            for signal in &group.values {
-                rss += Explained::new(signal, &columns, &factored).left;
-            }
+            let explained = Explained::new(&group.signals, &columns, &factored);
+            rss += explained.left.iter().sum::<f64>();
         }
         rss
     }
@@ -214,8 +211,8 @@ impl Signals {
 
     /// Sum of the squares of all values.
     pub fn squares(&self) -> f64 {
-        let values = self.groups.iter().flat_map(|group| &group.values);
-        values.flatten().map(|x| x * x).sum()
+        let squares = self.groups.iter().flat_map(|g| &g.signals.squares);
+        squares.sum()
     }
 
     /// The mode that takes off most of what a fit leaves, by trying.
@@ -225,16 +222,17 @@ impl Signals {
         // The frames that a signal lacks are 0 here: good enough for a first guess, and one set of
         // columns serves all.
         let present = Qr::new(columns);
-        let residuals: Vec<Residual> = residuals
-            .into_iter()
-            .map(|left| Residual::new(left, &present))
-            .collect();
-        let times = self.times_of(fit);
+        let gains = match self.start {
+            Start::Rest => self.tried(fit).explained(&present, &residuals),
+            // The moment is not fitted.
+            Start::Moving => {
+                let tried = self.tried.get_or_init(|| self.tried(fit));
+                tried.explained(&present, &residuals)
+            }
+        };
         let mut best: Option<(f64, Mode)> = None;
-        for mode in mode_grid(self.frequencies_hz, SEARCHED_PER_E) {
-            let columns = mode.columns(&times, self.start);
-            let extension = Extension::new(&columns, &present);
-            let gain: f64 = residuals.iter().map(|r| extension.explained(r)).sum();
+        for (mode, gains) in self.modes_tried().into_iter().zip(gains.row_iter()) {
+            let gain = gains.sum();
             if gain.is_finite() && gain > best.map_or(0.0, |(gain, _)| gain) {
                 best = Some((gain, mode));
             }
@@ -242,19 +240,32 @@ impl Signals {
         best.map(|(_, mode)| mode)
     }
 
-    /// What columns leave of every signal; 0 where it was not seen.
-    fn residuals(&self, columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    fn modes_tried(&self) -> Vec<Mode> {
+        mode_grid(self.frequencies_hz, SEARCHED_PER_E)
+    }
+
+    /// The columns of the modes that are tried, from the moment of a fit on.
+    fn tried(&self, fit: &Fit) -> Candidates {
+        let times = self.times_of(fit);
+        let modes = self.modes_tried().into_iter();
+        Candidates::new(modes.map(|m| m.columns(&times, self.start)), times.len())
+    }
+
+    /// What columns leave of every signal, a column for each; 0 where it was not seen.
+    fn residuals(&self, columns: &[Vec<f64>]) -> DMatrix<f64> {
         let columns = slices(columns);
         let all = gram(&columns);
         let mut out = Vec::new();
+        let mut signals = 0;
         for group in &self.groups {
             let factored = GramCholesky::new(&group.gram(&all, &columns), columns.len());
-            for signal in &group.values {
-                let factors = Explained::new(signal, &columns, &factored).factors;
-                out.push(group.rest(signal, &columns, &factors));
+            let explained = Explained::new(&group.signals, &columns, &factored);
+            for (signal, factors) in group.signals.each().zip(explained.factors_of_each()) {
+                out.extend(group.rest(signal, &columns, factors));
+                signals += 1;
             }
         }
-        out
+        DMatrix::from_vec(self.times_s.len(), signals, out)
     }
 
     /// The factors of every mode in every signal, `[signal][mode]`, with their significance;
@@ -267,9 +278,10 @@ impl Signals {
         for group in &self.groups {
             let factored = GramCholesky::new(&group.gram(&all, &columns), columns.len());
             let variances = factored.variances();
-            for (id, signal) in group.ids.iter().zip(&group.values) {
-                let factors = Explained::new(signal, &columns, &factored).factors;
-                let rest = group.rest(signal, &columns, &factors);
+            let explained = Explained::new(&group.signals, &columns, &factored);
+            let signals = group.signals.each().zip(explained.factors_of_each());
+            for (id, (signal, factors)) in group.ids.iter().zip(signals) {
+                let rest = group.rest(signal, &columns, factors);
                 let free = group.seen.len().saturating_sub(factors.len()).max(1) as f64;
                 let noise = dot(&rest, &rest) / free * variance_inflation(&rest);
                 for (m, factor) in out[*id].iter_mut().enumerate() {
@@ -283,6 +295,26 @@ impl Signals {
 }
 
 impl Group {
+    /// Of the signals `ids` of `signals`.
+    fn new(seen: Vec<usize>, ids: Vec<usize>, signals: &[Vec<f64>]) -> Self {
+        let frames = signals.first().map_or(0, Vec::len);
+        let lacking: Vec<usize> = (0..frames)
+            .filter(|k| seen.binary_search(k).is_err())
+            .collect();
+        let mut values: Vec<Vec<f64>> = Vec::with_capacity(ids.len());
+        for &id in &ids {
+            let mut signal = signals[id].clone();
+            lacking.iter().for_each(|&k| signal[k] = 0.0);
+            values.push(signal);
+        }
+        Self {
+            seen,
+            lacking,
+            ids,
+            signals: SignalBlock::new(&slices(&values)),
+        }
+    }
+
     /// Products of columns over the frames in which the signals were seen, from those over `all`
     /// frames.
     pub fn gram(&self, all: &DMatrix<f64>, columns: &[&[f64]]) -> DMatrix<f64> {

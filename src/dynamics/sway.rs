@@ -2,12 +2,13 @@
 
 use super::branch_tree::BranchTree;
 use super::branches::{BELOW_NYQUIST, SearchLimits};
+use super::decaying_motions::DecayingMotions;
 use super::film::Film;
 use super::free_decay;
 use super::members::{members, trunk};
 use super::modal;
 use super::point_modes::{PointModes, Shoot, is_open, may_have_other};
-use super::release::{Onset, onset};
+use super::release::{FoundOnset, Onset, onset};
 use super::tree_modes;
 use super::whole_tree::modes_of_tree;
 use super::wind;
@@ -136,6 +137,8 @@ pub(super) struct UsableFilm<'a> {
     pub trunk: NodeId,
     pub onset: Onset,
     pub releases_s: Vec<f64>,
+    /// The motions of all points after a release, where there are enough frames.
+    pub decaying: Option<DecayingMotions>,
     pub limits: SearchLimits,
     /// As far as it is used.
     pub film: Cow<'a, Film>,
@@ -148,9 +151,7 @@ impl<'a> UsableFilm<'a> {
         let (members, trunk) = (&self.members, self.trunk);
         match self.onset.excitation {
             Excitation::Wind => wind::sways(tree, film, members, trunk, limits, cancel),
-            Excitation::Release => {
-                free_decay::sways(tree, film, members, trunk, &self.onset, limits, cancel)
-            }
+            Excitation::Release => free_decay::sways(tree, self, cancel),
         }
     }
 
@@ -196,7 +197,11 @@ impl<'a> UsableFilm<'a> {
         let members = members(tree, film);
         let trunk = trunk(tree, &members);
         let of_tree: &[usize] = members.get(trunk.index()).map_or(&[], Vec::as_slice);
-        let (onset, releases_s) = onset(film, of_tree, given, frequencies_hz, cancel);
+        let FoundOnset {
+            onset,
+            releases_s,
+            decaying,
+        } = onset(film, of_tree, given, frequencies_hz, cancel);
         if cancel.is_cancelled() {
             return Err(Unidentified::NotInTime);
         }
@@ -209,6 +214,7 @@ impl<'a> UsableFilm<'a> {
             trunk,
             onset,
             releases_s,
+            decaying,
             limits: SearchLimits {
                 frequencies_hz,
                 highest_hz: config.highest_hz,

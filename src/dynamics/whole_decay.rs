@@ -37,23 +37,22 @@ pub(super) struct Fundamental {
     pub amplitude_deg: f64,
 }
 
-/// Of `tracks`, which turn about `base_px`. `None` where there are too few points or frames, where
-/// fewer than half of the numbers of modes have any that a tree may have, and where `cancel` ends
-/// the work before.
+/// Of the motions since a release in `film`, of points which turn about `base_px`. `None` where there
+/// are too few points, where fewer than half of the numbers of modes have any that a tree may have,
+/// and where `cancel` ends the work before.
 pub(super) fn fundamental(
+    decaying: &DecayingMotions,
     film: &Film,
-    tracks: &[usize],
     base_px: Point2<f64>,
     onset: &Onset,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<Fundamental> {
-    let decaying = DecayingMotions::since(onset.from, film, tracks)?;
     let points = &decaying.points;
     if 2 * points.tracks.len() < OF_SUBSPACE {
         return None;
     }
-    let found = asked(&decaying, onset, limits, cancel)?;
+    let found = asked(decaying, onset, limits, cancel)?;
     if 2 * found.len() <= MOST_MODES - LEAST_MODES {
         return None;
     }
@@ -242,8 +241,8 @@ mod tests {
         };
         let tracks: Vec<usize> = (0..film.tracks.len()).collect();
         fundamental(
+            &DecayingMotions::since(onset.from, film, &tracks)?,
             film,
-            &tracks,
             Point2::new(118.0, 200.0),
             &onset,
             &limits,

@@ -7,6 +7,7 @@
 //! Not nalgebra's Cholesky, which fails as a whole where a column depends on others: here that
 //! column gets the factor 0. Where a matrix is definite, nalgebra's is used.
 
+use super::principal::symmetric;
 use super::vectors::dot;
 use nalgebra::DMatrix;
 
@@ -14,17 +15,35 @@ use nalgebra::DMatrix;
 /// nothing is left: the others span it.
 const MIN_SQUARE_LEFT: f64 = 1e-10;
 
+/// nalgebra multiplies matrices with no more rows or columns than this one vector at a time, which
+/// takes longer than their products one by one.
+const FEW: usize = 5;
+
 /// Products of `columns` with each other.
 pub fn gram(columns: &[&[f64]]) -> DMatrix<f64> {
-    let n = columns.len();
-    let mut out = DMatrix::zeros(n, n);
-    for i in 0..n {
-        for k in 0..=i {
-            let product = dot(columns[i], columns[k]);
-            (out[(i, k)], out[(k, i)]) = (product, product);
-        }
+    if columns.len() <= FEW {
+        return symmetric(columns.len(), |i, k| dot(columns[i], columns[k]));
     }
-    out
+    let matrix = side_by_side(columns);
+    matrix.transpose() * &matrix
+}
+
+/// Products of `columns`, a row of them for each, with each column of `signals`.
+pub fn products(columns: &[&[f64]], signals: &DMatrix<f64>) -> DMatrix<f64> {
+    let (n, frames) = (columns.len(), signals.nrows());
+    if n <= FEW || signals.ncols() <= FEW {
+        let signals_of = signals.as_slice();
+        return DMatrix::from_fn(n, signals.ncols(), |i, k| {
+            dot(columns[i], &signals_of[k * frames..(k + 1) * frames])
+        });
+    }
+    side_by_side(columns).transpose() * signals
+}
+
+/// Columns of one length as a matrix.
+pub fn side_by_side(columns: &[&[f64]]) -> DMatrix<f64> {
+    let rows = columns.first().map_or(0, |c| c.len());
+    DMatrix::from_vec(rows, columns.len(), columns.concat())
 }
 
 /// The same without `rows`.
@@ -68,29 +87,46 @@ impl GramCholesky {
         Self { l }
     }
 
-    /// L⁻¹ x, of the columns that have factors; 0 for the others.
-    fn forward(&self, x: &[f64]) -> Vec<f64> {
+    /// How many columns it is of.
+    pub fn columns(&self) -> usize {
+        self.l.nrows()
+    }
+
+    /// L⁻¹ x in place, of the columns that have factors; 0 for the others. Its squares are those that
+    /// the columns explain of a signal whose products with them are `x`.
+    pub fn forward(&self, x: &mut [f64]) {
         let (n, l) = (self.l.nrows(), &self.l);
-        let mut out = vec![0.0; n];
-        for k in (0..n).filter(|&k| l[(k, k)] > 0.0) {
-            out[k] = (x[k] - (0..k).map(|m| l[(k, m)] * out[m]).sum::<f64>()) / l[(k, k)];
+        for k in 0..n {
+            x[k] = if l[(k, k)] > 0.0 {
+                (x[k] - (0..k).map(|m| l[(k, m)] * x[m]).sum::<f64>()) / l[(k, k)]
+            } else {
+                0.0
+            };
         }
-        out
     }
 
     /// C⁻¹ x, of the columns that have factors; 0 for the others.
     pub fn solve(&self, x: &[f64]) -> Vec<f64> {
-        let (n, l) = (self.l.nrows(), &self.l);
-        let mut out = self.forward(x);
-        for k in (0..n).rev().filter(|&k| l[(k, k)] > 0.0) {
-            out[k] = (out[k] - (k + 1..n).map(|m| l[(m, k)] * out[m]).sum::<f64>()) / l[(k, k)];
-        }
+        let mut out = x[..self.l.nrows()].to_vec();
+        self.solve_in_place(&mut out);
         out
     }
 
-    /// x' C⁻¹ x: squares that the columns explain of a signal whose products with them are `x`.
-    pub fn explained(&self, x: &[f64]) -> f64 {
-        self.forward(x).iter().map(|x| x * x).sum()
+    /// C⁻¹ times each column of a matrix.
+    pub fn solve_each(&self, mut columns: DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.l.nrows();
+        for column in columns.as_mut_slice().chunks_exact_mut(n.max(1)) {
+            self.solve_in_place(column);
+        }
+        columns
+    }
+
+    fn solve_in_place(&self, x: &mut [f64]) {
+        let (n, l) = (self.l.nrows(), &self.l);
+        self.forward(x);
+        for k in (0..n).rev().filter(|&k| l[(k, k)] > 0.0) {
+            x[k] = (x[k] - (k + 1..n).map(|m| l[(m, k)] * x[m]).sum::<f64>()) / l[(k, k)];
+        }
     }
 
     /// Diagonal of C⁻¹: variances of the factors for noise of variance 1.

@@ -6,9 +6,8 @@
 //! factors. Products of columns with signals are all that is needed; the Jacobian itself is never
 //! made.
 
-use super::gram::GramCholesky;
+use super::gram::{GramCholesky, products, side_by_side};
 use super::least_squares::NormalEquations;
-use super::principal::symmetric;
 use super::vectors::{dot, slices};
 use nalgebra::DMatrix;
 
@@ -35,76 +34,103 @@ impl Basis {
     }
 }
 
-/// What columns explain of one signal.
+/// Signals that were seen in the same frames.
+pub struct SignalBlock {
+    /// A column for each signal: its values in all frames, 0 where it was not seen.
+    pub values: DMatrix<f64>,
+    /// Sum of the squares of each.
+    pub squares: Vec<f64>,
+}
+
+impl SignalBlock {
+    /// Of signals of one length.
+    pub fn new(signals: &[&[f64]]) -> Self {
+        Self {
+            values: side_by_side(signals),
+            squares: signals.iter().map(|y| dot(y, y)).collect(),
+        }
+    }
+
+    pub fn count(&self) -> usize {
+        self.squares.len()
+    }
+
+    /// The signals one by one.
+    pub fn each(&self) -> impl Iterator<Item = &[f64]> {
+        let frames = self.values.nrows().max(1);
+        self.values.as_slice().chunks_exact(frames)
+    }
+}
+
+/// What columns explain of some signals.
 pub struct Explained {
-    /// Products of all columns with the signal.
-    pub products: Vec<f64>,
-    /// Of the columns that were factored.
-    pub factors: Vec<f64>,
-    /// Squares that are left.
-    pub left: f64,
+    /// Products of all columns, a row for each, with the signals.
+    pub products: DMatrix<f64>,
+    /// Of the columns that were factored, a row for each, in the signals.
+    pub factors: DMatrix<f64>,
+    /// Squares that are left of each signal.
+    pub left: Vec<f64>,
 }
 
 impl Explained {
-    /// Of `y` by the first of `columns`, as many as `factored` holds; the products are had of all.
-    pub fn new(y: &[f64], columns: &[&[f64]], factored: &GramCholesky) -> Self {
-        let products: Vec<f64> = columns.iter().map(|c| dot(c, y)).collect();
-        let factors = factored.solve(&products);
-        let left = (dot(y, y) - dot(&products[..factors.len()], &factors)).max(0.0);
+    /// Of `signals` by the first of `columns`, as many as `factored` holds; the products are had of
+    /// all.
+    pub fn new(signals: &SignalBlock, columns: &[&[f64]], factored: &GramCholesky) -> Self {
+        let products = products(columns, &signals.values);
+        let of_factored = products.rows(0, factored.columns()).into_owned();
+        let factors = factored.solve_each(of_factored.clone());
+        let mut left = Vec::with_capacity(signals.count());
+        for (k, squares) in signals.squares.iter().enumerate() {
+            let taken = of_factored.column(k).dot(&factors.column(k));
+            left.push((squares - taken).max(0.0));
+        }
         Self {
             products,
             factors,
             left,
         }
     }
-}
 
-/// A signal that is fitted, 0 where it was not seen, and what each of its squares counts.
-#[derive(Clone, Copy)]
-pub struct Weighted<'a> {
-    pub values: &'a [f64],
-    pub weight: f64,
+    /// The factors of one signal after the other.
+    pub fn factors_of_each(&self) -> impl Iterator<Item = &[f64]> {
+        self.factors
+            .as_slice()
+            .chunks_exact(self.factors.nrows().max(1))
+    }
 }
 
 impl NormalEquations {
-    /// Adds the share of signals that were seen in the same frames: `gram` holds the products of
-    /// the basis' columns and slopes there. Returns the squares that are left, weighted.
-    pub fn add_signals<'a>(
+    /// Adds the share of signals that were seen in the same frames, each square of which counts
+    /// `weights`: `gram` holds the products of the basis' columns and slopes there. Returns the
+    /// squares that are left, weighted.
+    pub fn add_signals(
         &mut self,
         basis: &Basis,
         gram: &DMatrix<f64>,
-        signals: impl Iterator<Item = Weighted<'a>>,
+        signals: &SignalBlock,
+        weights: &[f64],
     ) -> f64 {
-        let n = basis.columns.len();
-        let all = basis.columns_and_slopes();
+        let (n, slopes) = (basis.columns.len(), basis.slopes.len());
         let factored = GramCholesky::new(gram, n);
-        let mut left = 0.0;
-        let mut explained: Vec<(Explained, f64)> = Vec::new();
-        for signal in signals {
-            let of = Explained::new(signal.values, &all, &factored);
-            left += signal.weight * of.left;
-            explained.push((of, signal.weight));
+        let explained = Explained::new(signals, &basis.columns_and_slopes(), &factored);
+        let factors = &explained.factors;
+        let mut weighted = factors.clone();
+        for (mut column, weight) in weighted.column_iter_mut().zip(weights) {
+            column *= *weight;
         }
-        let factor_products = symmetric(n, |a, b| {
-            let mut sum = 0.0;
-            for (e, weight) in &explained {
-                sum += weight * e.factors[a] * e.factors[b];
-            }
-            sum
-        });
+        let factor_products = &weighted * factors.transpose();
+        let on_columns = gram.view((0, n), (n, slopes));
+        let spanned = factored.solve_each(on_columns.into_owned());
+        let unspanned = gram.view((n, n), (slopes, slopes)) - spanned.transpose() * on_columns;
+        let rests = explained.products.rows(n, slopes) - on_columns.transpose() * factors;
         for (s, slope) in basis.slopes.iter().enumerate() {
-            let on_columns: Vec<f64> = (0..n).map(|c| gram[(c, n + s)]).collect();
-            let spanned = factored.solve(&on_columns);
             for (t, other) in basis.slopes.iter().enumerate() {
-                let both: f64 = (0..n).map(|c| spanned[c] * gram[(c, n + t)]).sum();
                 self.hessian[(slope.parameter, other.parameter)] +=
-                    (gram[(n + s, n + t)] - both) * factor_products[(slope.column, other.column)];
+                    unspanned[(s, t)] * factor_products[(slope.column, other.column)];
             }
-            for (e, weight) in &explained {
-                let unspanned = e.products[n + s] - dot(&on_columns, &e.factors);
-                self.gradient[slope.parameter] += weight * e.factors[slope.column] * unspanned;
-            }
+            self.gradient[slope.parameter] += weighted.row(slope.column).dot(&rests.row(s));
         }
-        left
+        let left = explained.left.iter().zip(weights);
+        left.map(|(left, weight)| weight * left).sum()
     }
 }

@@ -296,18 +296,17 @@ mod tests {
     fn groups(skeleton: &Skeleton, film: &Film) -> Vec<Vec<usize>> {
         let cancel = CancelToken::new();
         let tree = BranchTree::of(skeleton);
-        let Ok(UsableFilm {
-            members,
+        let Ok(usable) = UsableFilm::of(&tree, film, &Dynamics::default(), &cancel) else {
+            return Vec::new();
+        };
+        let sways = free_decay::sways(&tree, &usable, &cancel);
+        let UsableFilm {
             trunk,
             onset,
             limits,
             film,
             ..
-        }) = UsableFilm::of(&tree, film, &Dynamics::default(), &cancel)
-        else {
-            return Vec::new();
-        };
-        let sways = free_decay::sways(&tree, &film, &members, trunk, &onset, &limits, &cancel);
+        } = usable;
         let Some(found) = point_modes(&tree, &film, trunk, &onset, &limits, &sways, &cancel) else {
             return Vec::new();
         };

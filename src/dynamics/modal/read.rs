@@ -135,7 +135,7 @@ impl Tree<'_> {
             let others: Vec<usize> = of.iter().copied().filter(|m| *m != branch).collect();
             let without = Qr::new(self.columns_of(&others));
             for point in points {
-                let left = self.left(&design, point);
+                let left = self.left(&design.qr, point);
                 let values = &self.decay.points[point].values;
                 let mut taken = 0.0;
                 for y in values {

@@ -1,14 +1,16 @@
 //! Frequencies and dampings of many branches at once, every point with the modes that it has:
 //! variable projection, as for one branch (fit.rs).
 
-use super::super::decay::{LN_DAMPING_WEIGHT, Mode, USUAL_DAMPING, damping_penalty};
-use super::tree::{EFFECTIVE_VALUES, Tree};
+use super::super::decay::{LN_DAMPING_WEIGHT, Mode, Slopes, USUAL_DAMPING, damping_penalty};
+use super::tree::{Design, EFFECTIVE_VALUES, Tree};
 use crate::bounds::Bounds;
-use crate::signal::gram::gram;
+use crate::signal::gram::{GramCholesky, gram};
 use crate::signal::least_squares::{
     LeastSquares, NormalEquations, ParameterLimits, Stopping, levenberg_marquardt,
 };
-use crate::signal::variable_projection::{Basis, Slope, Weighted};
+use crate::signal::variable_projection::{Basis, Explained, SignalBlock, Slope};
+use crate::signal::vectors::{dot, slices};
+use std::collections::BTreeSet;
 
 /// How far a step may go.
 const MAX_LN_FREQUENCY_STEP: f64 = 0.05;
@@ -19,10 +21,14 @@ const MIN_GAIN: f64 = 0.5;
 
 /// Points that have the same modes.
 struct PointGroup {
-    branch: usize,
-    points: Vec<usize>,
-    /// Of every point: what one square counts.
+    /// The branches whose modes they are.
+    of: Vec<usize>,
+    /// Right and down of each point in turn.
+    signals: SignalBlock,
+    /// Of every signal: what one square counts.
     weights: Vec<f64>,
+    /// What noise counts, in all of them.
+    noise: f64,
 }
 
 /// A fit of the modes of the branches `free`; the other modes stay.
@@ -43,12 +49,22 @@ impl<'d> ModesFit<'_, 'd> {
 impl LeastSquares for ModesFit<'_, '_> {
     fn cost(&self, x: &[f64]) -> f64 {
         let tree = self.tree_at(x);
+        let ones = vec![1.0; tree.decay.times_s.len()];
+        let mut of_branches = vec![Vec::new(); tree.branches.len()];
+        for b in branches_of(self.groups) {
+            of_branches[b] = tree.branches[b]
+                .mode
+                .map_or(Vec::new(), |m| tree.decay.columns(&m));
+        }
         let mut cost = 0.0;
         for group in self.groups {
-            let design = tree.design(group.branch);
-            for (&p, weight) in group.points.iter().zip(&group.weights) {
-                cost += weight * tree.left(&design, p);
+            let mut columns: Vec<&[f64]> = vec![&ones];
+            for &b in &group.of {
+                columns.extend(slices(&of_branches[b]));
             }
+            let factored = GramCholesky::new(&gram(&columns), columns.len());
+            let left = Explained::new(&group.signals, &columns, &factored).left;
+            cost += dot(&left, &group.weights) + group.noise;
         }
         for mode in x.chunks_exact(2) {
             cost += damping_penalty(mode[1]);
@@ -61,12 +77,16 @@ impl LeastSquares for ModesFit<'_, '_> {
     }
 }
 
+/// The branches whose modes some groups have, each once.
+fn branches_of(groups: &[PointGroup]) -> BTreeSet<usize> {
+    groups.iter().flat_map(|g| g.of.iter().copied()).collect()
+}
+
 impl Tree<'_> {
     /// Fits the modes of `free` to the points of the branches `within`; the other modes stay.
     pub fn refit(&mut self, free: &[usize], within: &[usize], max_steps: usize) {
         let free = self.with_modes(free);
-        let mut groups = self.groups(within);
-        groups.retain(|g| !g.points.is_empty());
+        let groups = self.groups(within);
         if free.is_empty() || groups.is_empty() {
             return;
         }
@@ -121,17 +141,30 @@ impl Tree<'_> {
         }
     }
 
+    /// The points of some branches, where there are any.
     fn groups(&self, branches: &[usize]) -> Vec<PointGroup> {
         let mut out = Vec::with_capacity(branches.len());
         for &branch in branches {
             let points = self.own(branch);
-            let design = self.design(branch);
-            let left = points.iter().map(|&p| self.left(&design, p));
-            let weights = left.map(|left| EFFECTIVE_VALUES / left).collect();
+            if points.is_empty() {
+                continue;
+            }
+            let Design { of, qr } = self.design(branch);
+            let (mut signals, mut weights, mut noise) = (Vec::new(), Vec::new(), 0.0);
+            for p in points {
+                let weight = EFFECTIVE_VALUES / self.left(&qr, p);
+                let point = &self.decay.points[p];
+                noise += weight * point.floor;
+                for values in &point.values {
+                    signals.push(values.as_slice());
+                    weights.push(weight);
+                }
+            }
             out.push(PointGroup {
-                branch,
-                points,
+                of,
+                signals: SignalBlock::new(&signals),
                 weights,
+                noise,
             });
         }
         out
@@ -139,19 +172,21 @@ impl Tree<'_> {
 
     fn normal_equations(&self, free: &[usize], groups: &[PointGroup]) -> NormalEquations {
         let mut normal = NormalEquations::zeros(2 * free.len());
+        let mut of_branches: Vec<Vec<(Vec<f64>, Slopes)>> = Vec::new();
+        of_branches.resize_with(self.branches.len(), Vec::new);
+        for b in branches_of(groups) {
+            if let Some(mode) = self.branches[b].mode {
+                let (times_s, start) = (&self.decay.times_s, self.decay.start);
+                of_branches[b] = mode.columns_and_slopes(times_s, start);
+            }
+        }
         for group in groups {
-            let basis = self.basis(group.branch, free);
+            let basis = self.basis(&group.of, free, &of_branches);
             if basis.slopes.is_empty() {
                 continue;
             }
-            let mut signals = Vec::with_capacity(2 * group.points.len());
-            for (&p, &weight) in group.points.iter().zip(&group.weights) {
-                for values in &self.decay.points[p].values {
-                    signals.push(Weighted { values, weight });
-                }
-            }
             let products = gram(&basis.columns_and_slopes());
-            normal.add_signals(&basis, &products, signals.into_iter());
+            normal.add_signals(&basis, &products, &group.signals, &group.weights);
         }
         for (k, x) in self.parameters(free).chunks_exact(2).enumerate() {
             normal.add_prior(2 * k + 1, USUAL_DAMPING.ln() - x[1], LN_DAMPING_WEIGHT);
@@ -159,28 +194,29 @@ impl Tree<'_> {
         normal
     }
 
-    /// The columns of the modes that the points of `branch` have, and how those of the branches
-    /// `free` change with their parameters.
-    fn basis(&self, branch: usize, free: &[usize]) -> Basis {
+    /// The columns of the modes of the branches `of`, and how those of the branches `free` change with
+    /// their parameters, from those of all branches.
+    fn basis(
+        &self,
+        of: &[usize],
+        free: &[usize],
+        of_branches: &[Vec<(Vec<f64>, Slopes)>],
+    ) -> Basis {
         let mut basis = Basis {
             columns: vec![vec![1.0; self.decay.times_s.len()]],
             slopes: Vec::new(),
         };
-        for b in self.modes_of(branch) {
-            let Some(mode) = self.branches[b].mode else {
-                continue;
-            };
+        for &b in of {
             let place = free.iter().position(|f| *f == b);
-            let columns = mode.columns_and_slopes(&self.decay.times_s, self.decay.start);
-            for (values, slopes) in columns {
+            for (values, slopes) in &of_branches[b] {
                 let column = basis.columns.len();
-                basis.columns.push(values);
+                basis.columns.push(values.clone());
                 let Some(place) = place else { continue };
-                for (i, values) in slopes.by_mode.into_iter().enumerate() {
+                for (i, values) in slopes.by_mode.iter().enumerate() {
                     basis.slopes.push(Slope {
                         parameter: 2 * place + i,
                         column,
-                        values,
+                        values: values.clone(),
                     });
                 }
             }

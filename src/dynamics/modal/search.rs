@@ -2,10 +2,11 @@
 
 use super::super::decay::Mode;
 use super::super::mode_search::mode_grid;
-use super::tree::{COST_PER_POINT, Decay, Design, EFFECTIVE_VALUES, Tree};
+use super::tree::{COST_PER_POINT, Decay, EFFECTIVE_VALUES, Tree};
 use crate::bounds::Bounds;
-use crate::signal::extension::{Extension, Residual};
+use crate::signal::extension::Candidates;
 use crate::signal::statistics::quantile;
+use nalgebra::DMatrix;
 
 /// Frequencies that are tried per factor of e, and up to which, Hz.
 const TRIED_PER_E: f64 = 33.0;
@@ -20,8 +21,11 @@ const MIN_GAIN: f64 = 16.0;
 /// Points that a branch must have.
 pub(super) const MIN_POINTS: usize = 4;
 
-/// The modes that are tried, as columns.
-pub(super) struct Tried(Vec<(Mode, Vec<Vec<f64>>)>);
+/// The modes that are tried.
+pub(super) struct Tried {
+    modes: Vec<Mode>,
+    columns: Candidates,
+}
 
 /// A mode that some of the points have.
 pub(super) struct Found {
@@ -35,46 +39,43 @@ impl Tried {
     pub fn new(decay: &Decay) -> Self {
         let Bounds { lo, hi } = decay.frequencies_hz;
         let modes = mode_grid(Bounds::new(lo, hi.min(HIGHEST_HZ).max(lo)), TRIED_PER_E);
-        Self(modes.into_iter().map(|m| (m, decay.columns(&m))).collect())
+        let columns = modes.iter().map(|m| decay.columns(m));
+        Self {
+            columns: Candidates::new(columns, decay.times_s.len()),
+            modes,
+        }
     }
 }
 
-/// Some points with the same modes, and what those leave of them.
+/// Some points with the same modes, and what others would take off them.
 struct Rests {
-    design: Design,
     points: Vec<usize>,
-    left: Vec<f64>,
-    residuals: Vec<[Residual; 2]>,
+    /// What each mode that is tried, a row for each, takes off, as a share of what is left of each
+    /// point; 0 if it could not be told from what the points have.
+    taken_shares: DMatrix<f64>,
 }
 
 impl Rests {
-    fn new(tree: &Tree, branch: usize, points: Vec<usize>) -> Self {
-        let design = tree.design(branch);
+    fn new(tree: &Tree, branch: usize, points: Vec<usize>, tried: &Tried) -> Self {
+        let qr = tree.design(branch).qr;
         let mut left = Vec::with_capacity(points.len());
-        let mut residuals = Vec::with_capacity(points.len());
+        let mut residuals = Vec::new();
         for &p in &points {
-            left.push(tree.left(&design, p));
-            let [u, v] = &tree.decay.points[p].values;
-            residuals.push([u, v].map(|y| Residual::new(design.qr.solve(y).0, &design.qr)));
+            left.push(tree.left(&qr, p));
+            for y in &tree.decay.points[p].values {
+                residuals.extend(qr.solve(y).0);
+            }
         }
+        let frames = tree.decay.times_s.len();
+        let residuals = DMatrix::from_vec(frames, 2 * points.len(), residuals);
+        let taken = tried.columns.explained(&qr, &residuals);
+        let taken_shares = DMatrix::from_fn(tried.modes.len(), points.len(), |mode, k| {
+            (taken[(mode, 2 * k)] + taken[(mode, 2 * k + 1)]) / left[k]
+        });
         Self {
-            design,
             points,
-            left,
-            residuals,
+            taken_shares,
         }
-    }
-
-    /// What a mode with these columns takes off, as a share of what is left of each point; nothing
-    /// if it could not be told from what the points have.
-    fn taken_shares(&self, columns: &[Vec<f64>]) -> Vec<f64> {
-        let extension = Extension::new(columns, &self.design.qr);
-        let mut out = Vec::with_capacity(self.points.len());
-        for (uv, left) in self.residuals.iter().zip(&self.left) {
-            let taken: f64 = uv.iter().map(|r| extension.explained(r)).sum();
-            out.push(taken / left);
-        }
-        out
     }
 }
 
@@ -92,7 +93,7 @@ impl Tree<'_> {
         for &b in &within {
             let points = self.own(b);
             if !points.is_empty() {
-                rests.push(Rests::new(self, b, points));
+                rests.push(Rests::new(self, b, points, tried));
             }
         }
         let mut parts: Vec<Vec<usize>> = vec![(0..rests.len()).collect()];
@@ -103,11 +104,11 @@ impl Tree<'_> {
             }
         }
         let mut best: Option<(f64, Mode)> = None;
-        for (mode, columns) in &tried.0 {
+        for (k, mode) in tried.modes.iter().enumerate() {
             let mut gains: Vec<Vec<f64>> = Vec::with_capacity(rests.len());
             for rests in &rests {
-                let shares = rests.taken_shares(columns).into_iter();
-                gains.push(shares.map(|share| EFFECTIVE_VALUES * share).collect());
+                let shares = rests.taken_shares.row(k);
+                gains.push(shares.iter().map(|s| EFFECTIVE_VALUES * s).collect());
             }
             if !parts.iter().all(|part| most_gain(&gains, part)) {
                 continue;
@@ -122,12 +123,12 @@ impl Tree<'_> {
 
     /// The mode that some of the `points` of `branch` itself have beyond theirs.
     pub fn mode_of_some(&self, branch: usize, points: Vec<usize>, tried: &Tried) -> Option<Found> {
-        let rests = Rests::new(self, branch, points);
+        let rests = Rests::new(self, branch, points, tried);
         let mut best: Option<Found> = None;
-        for (mode, columns) in &tried.0 {
+        for (k, mode) in tried.modes.iter().enumerate() {
             let mut worth = 0.0;
             let mut clear: Vec<usize> = Vec::new();
-            for (share, &point) in rests.taken_shares(columns).iter().zip(&rests.points) {
+            for (share, &point) in rests.taken_shares.row(k).iter().zip(&rests.points) {
                 let gain = -EFFECTIVE_VALUES * (1.0 - share).ln() - COST_PER_POINT;
                 worth += gain.max(0.0);
                 if gain > MIN_CLEAR_GAIN {

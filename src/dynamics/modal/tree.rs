@@ -28,9 +28,10 @@ const USUAL_OF_MEDIAN: f64 = 2.5;
 pub(super) struct Point {
     /// Displacement to the right and down from the mean, px.
     pub values: [Vec<f64>; 2],
-    /// Sum of their squares, and of those of noise, px².
+    /// Sum of their squares, px².
     squares: f64,
-    floor: f64,
+    /// That of noise, px².
+    pub floor: f64,
     /// Mean place, px.
     pub at_px: Point2<f64>,
 }
@@ -186,9 +187,9 @@ impl Tree<'_> {
     }
 
     /// Squares of a point that a design leaves, with those of noise, px².
-    pub fn left(&self, design: &Design, point: usize) -> f64 {
+    pub fn left(&self, design: &Qr, point: usize) -> f64 {
         let point = &self.decay.points[point];
-        let taken: f64 = point.values.iter().map(|y| design.qr.explained(y)).sum();
+        let taken: f64 = point.values.iter().map(|y| design.explained(y)).sum();
         (point.squares - taken).max(0.0) + point.floor
     }
 
@@ -198,7 +199,7 @@ impl Tree<'_> {
         let modes = design.of.len() as f64;
         points
             .iter()
-            .map(|&p| EFFECTIVE_VALUES * self.left(&design, p).ln() + COST_PER_POINT * modes)
+            .map(|&p| EFFECTIVE_VALUES * self.left(&design.qr, p).ln() + COST_PER_POINT * modes)
             .collect()
     }
 

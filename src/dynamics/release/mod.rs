@@ -71,26 +71,48 @@ pub struct Onset {
     pub to: usize,
 }
 
+/// What made a film's tree sway, and what else is had where that is told.
+pub(super) struct FoundOnset {
+    pub onset: Onset,
+    /// Where there are several releases, when each was, s.
+    pub releases_s: Vec<f64>,
+    /// After a release the motions of all points; `None` where there are too few frames, and in wind.
+    pub decaying: Option<DecayingMotions>,
+}
+
+impl FoundOnset {
+    fn wind(film: &Film) -> Self {
+        Self {
+            onset: Onset {
+                excitation: Excitation::Wind,
+                start: Start::Moving,
+                at_s: film.times_s.first().copied().unwrap_or(0.0),
+                from: 0,
+                to: film.times_s.len(),
+            },
+            releases_s: Vec::new(),
+            decaying: None,
+        }
+    }
+}
+
 /// Looks at the points of the whole tree; `given` is what the user says. Frequencies of the tree
 /// lie within `frequencies_hz`. Where the tree was released several times, each from rest, it is
-/// the time with the greatest motion, until the next pull; and when each was, s. Nothing is to be
-/// made of it where `cancel` has ended it.
+/// the time with the greatest motion, until the next pull. Nothing is to be made of it where
+/// `cancel` has ended it.
 pub(super) fn onset(
     film: &Film,
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> (Onset, Vec<f64>) {
+) -> FoundOnset {
     if given != Some(Excitation::Wind)
         && let Some(found) = of_parts(film, tracks, given, frequencies_hz, cancel)
     {
         return found;
     }
-    (
-        of_one(film, tracks, given, frequencies_hz, cancel),
-        Vec::new(),
-    )
+    of_one(film, tracks, given, frequencies_hz, cancel)
 }
 
 /// The same of the parts that hold a release each; `None` where there are none, or one of them is
@@ -101,15 +123,16 @@ fn of_parts(
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> Option<(Onset, Vec<f64>)> {
-    let mut greatest: Option<(f64, Onset)> = None;
+) -> Option<FoundOnset> {
+    let mut greatest: Option<(f64, FoundOnset)> = None;
     let mut times_s = Vec::new();
     for frames in parts(film) {
         let part = film.part(frames.clone());
         // As with the whole film, less than a wave shows no frequency.
         let lowest_hz = frequencies_hz.lo * film.span_s() / part.span_s();
         let frequencies_hz = Bounds::new(lowest_hz.min(frequencies_hz.hi), frequencies_hz.hi);
-        let onset = of_one(&part, tracks, None, frequencies_hz, cancel);
+        let found = of_one(&part, tracks, None, frequencies_hz, cancel);
+        let onset = found.onset;
         if onset.excitation == Excitation::Wind {
             // Wind, too, may rest and come again. Where the film ends soon after, it does not tell.
             let tells = frames.end < film.times_s.len() || part.span_s() >= TELLS_S;
@@ -123,14 +146,18 @@ fn of_parts(
         let motion = of_some(&part.until(onset.to), tracks, onset.from).squares();
         if greatest.as_ref().is_none_or(|(most, _)| motion >= *most) {
             let [from, to] = [onset.from, onset.to].map(|k| frames.start + k);
-            greatest = Some((motion, Onset { from, to, ..onset }));
+            let onset = Onset { from, to, ..onset };
+            greatest = Some((motion, FoundOnset { onset, ..found }));
         }
     }
     let (_, greatest) = greatest?;
     if times_s.len() < 2 {
         times_s.clear();
     }
-    Some((greatest, times_s))
+    Some(FoundOnset {
+        releases_s: times_s,
+        ..greatest
+    })
 }
 
 /// Of a film with one release at most.
@@ -140,23 +167,16 @@ fn of_one(
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> Onset {
-    let wind = Onset {
-        excitation: Excitation::Wind,
-        start: Start::Moving,
-        at_s: film.times_s.first().copied().unwrap_or(0.0),
-        from: 0,
-        to: film.times_s.len(),
-    };
+) -> FoundOnset {
     let whole = of_some(film, tracks, 0);
     if given == Some(Excitation::Wind) || whole.tracks.is_empty() {
-        return wind;
+        return FoundOnset::wind(film);
     }
     let motion = greatest_motion(film, &whole);
     // What comes after it has died down must not come back either.
     let later = since(film, &motion);
     let energy_ratio = energy_ratio(&of_some(film, tracks, motion.from), &later);
-    let film = &film.until(motion.to);
+    let (whole_film, film) = (film, &film.until(motion.to));
     let decay = Decay {
         points: of_some(film, tracks, motion.from),
         times_s: since(film, &motion),
@@ -174,26 +194,31 @@ fn of_one(
         || decay.points.tracks.is_empty()
         || given.is_none() && !dies_down
     {
-        return wind;
+        return FoundOnset::wind(whole_film);
     }
+    let decaying = DecayingMotions::since(motion.from, film, tracks);
     if given.is_none() {
-        let left = DecayingMotions::since(motion.from, film, tracks).and_then(|motions| {
+        let left = decaying.as_ref().and_then(|motions| {
             motions.share_left(MODES_OF_ALL, motion.at_s, frequencies_hz, cancel)
         });
         if left.is_none_or(|left| left > criteria.max_left) {
-            return wind;
+            return FoundOnset::wind(whole_film);
         }
     }
-    Onset {
-        excitation: Excitation::Release,
-        start: if motion.rested && decay.fits_rest() {
-            Start::Rest
-        } else {
-            Start::Moving
+    FoundOnset {
+        onset: Onset {
+            excitation: Excitation::Release,
+            start: if motion.rested && decay.fits_rest() {
+                Start::Rest
+            } else {
+                Start::Moving
+            },
+            at_s: motion.at_s,
+            from: motion.from,
+            to: motion.to,
         },
-        at_s: motion.at_s,
-        from: motion.from,
-        to: motion.to,
+        releases_s: Vec::new(),
+        decaying,
     }
 }
 
