@@ -316,9 +316,10 @@ class Mesh:
         root = next(k for k, r in capture.rows.items() if not r["parent_id"])
         self.foot_px = capture.place_px[root] - np.array([1, -1]) * capture.place[root][:2] / capture.px
 
-    def front(self, size):
+    def front(self, size, leaves=False):
+        """(height, width) bool: pixels of which half is covered, by wood or also by leaves."""
         canvas = np.zeros((FINE * size[1], FINE * size[0]), np.uint8)
-        for triangles in self.wood:
+        for triangles in self.wood + (self.leaves if leaves else []):
             places = self.foot_px + np.array([1, -1]) * triangles[..., :2] / self.capture.px
             for corners in fixed(places):
                 cv2.fillConvexPoly(canvas, corners, 255, cv2.LINE_8, SHIFT)

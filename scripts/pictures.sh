@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, sketch, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# wind, grown, sketch, photo, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
 # clip) go to out/;
-# without CLIPS the second is of a film made anew, for which, and for `grown`, PYTHON (python3) needs numpy, scipy and opencv.
+# without CLIPS the second is of a film made anew, for which, and for `grown` and `photo`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -175,6 +175,26 @@ sketch() {
     row "$to/sketch-conifer.png" "$work/drawing-conifer.png" "$work"/made-drawn-conifer{,-side}.png
 }
 
+# A bare tree and one in leaf, each from a photograph with two strokes.
+photo() {
+    local seed look made
+    for seed in 32005 32002; do
+        look=bare
+        ((seed % 2)) || look=leaves
+        made=$work/photo-$seed
+        "$python" benches/made_photos.py "$work" "photo-$seed" "$seed" "$look" ||
+            fail "no photograph could be made; see the head of benches/made_photos.py for what PYTHON needs"
+        "$arborcam" photo "$made/photo.jpg" --crown "$made/crown.json" --branch "$made/trunk.json" --out "$work/seen-$seed" \
+            2>"$work/photo.log" || fail "photo of $seed failed: $(tail -n 1 "$work/photo.log")"
+        "$python" scripts/pictures.py photo "$made" "$work/seen-$seed" 256 "$work/strokes-$seed.png"
+        for view in front side; do
+            "$arborcam" render "$work/seen-$seed" --size 256x256 --view "$view" --out "$work/seen-$seed-$view.png" \
+                2>"$work/render.log" || fail "render of $seed failed: $(cat "$work/render.log")"
+        done
+        row "$to/photo-$look.png" "$work"/{strokes-$seed,seen-$seed-front,seen-$seed-side}.png
+    done
+}
+
 # Forty trees of eight on a hill.
 forest() {
     local tree=winter
@@ -296,6 +316,7 @@ wanted shapes && shapes
 wanted wind && wind
 wanted grown && grown
 wanted sketch && sketch
+wanted photo && photo
 wanted forest && forest
 wanted points && points
 wanted terminal && terminal

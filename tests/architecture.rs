@@ -22,7 +22,10 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
     // Pictures are carried to the rest pose.
-    ("wood", &["model", "config", "signal", "motion::Spread"]),
+    (
+        "wood",
+        &["model", "config", "signal", "motion::Spread", "random"],
+    ),
     ("hierarchy", &["model", "config", "signal"]),
     ("skeleton", &["model", "config"]),
     // The flat node that is stood up in space.
@@ -206,6 +209,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "report",
             "solve::Model",
             "solve::LEAST_MOVING",
+            // What one photograph shows, along strokes.
+            "wood",
             // What `analyze` asks of a capture's film.
             "dynamics::analyse",
             "dynamics::Depth",

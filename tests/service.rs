@@ -561,6 +561,7 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/camera.md",
     "usr/share/doc/arborcam/method.md",
     "usr/share/doc/arborcam/outline.md",
+    "usr/share/doc/arborcam/photo.md",
     "usr/share/doc/arborcam/sweep.md",
     "usr/share/doc/arborcam/recordings.md",
     "usr/share/doc/arborcam/files.md",

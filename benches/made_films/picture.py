@@ -6,11 +6,20 @@ import cv2
 import numpy as np
 
 WIDTH, HEIGHT, FPS = 640, 360, 30
+FILM_WIDTH, FILM_HEIGHT = WIDTH, HEIGHT
+ENLARGED = 1.0  # how many times as large as a frame of a film the picture is
 FINE = 4  # the tree is drawn this many times larger and then averaged down
 SHIFT = 4  # fractional bits of the corners of a facet on the fine picture
 FOOT_V_PX, MARGIN_PX = 328.0, 8.0
 NOISE_SIGMA = 2.5  # grey levels
 MJPEG_QUALITY = 3  # ffmpeg's scale, 2 is best
+
+
+def enlarge(factor):
+    """Make pictures so many times as large; before the other modules are loaded."""
+    global WIDTH, HEIGHT, ENLARGED, FOOT_V_PX, MARGIN_PX
+    WIDTH, HEIGHT, ENLARGED = round(factor * WIDTH), round(factor * HEIGHT), factor
+    FOOT_V_PX, MARGIN_PX = factor * FOOT_V_PX, factor * MARGIN_PX
 
 
 @dataclass
@@ -23,7 +32,7 @@ class Camera:
     def framing(rng, points_m):
         """Foot near the lower edge, the moving tree (T, N, 3) inside the picture."""
         half_width = np.abs(points_m[..., 0]).max()
-        scale = min(rng.uniform(44.0, 52.0), (FOOT_V_PX - MARGIN_PX) / points_m[..., 1].max(), (WIDTH / 2 - 40) / half_width)
+        scale = min(ENLARGED * rng.uniform(44.0, 52.0), (FOOT_V_PX - MARGIN_PX) / points_m[..., 1].max(), (WIDTH / 2 - 40 * ENLARGED) / half_width)
         return Camera(float(scale), (float(rng.uniform(-0.8, 0.8)), float((FOOT_V_PX - HEIGHT / 2 + 0.5) / scale)))
 
     def project(self, points_m):

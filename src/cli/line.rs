@@ -32,12 +32,17 @@ impl Line {
         Ok(line)
     }
 
+    /// Of the picture that it was drawn in.
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
+    }
+
     /// Checks that it was drawn in a picture of this size; `option` is what it was given to.
     ///
     /// # Errors
     /// It was drawn in one of another size.
     pub fn check_size(&self, option: &str, size: Size) -> Result<(), CommandError> {
-        if Size::new(self.width, self.height) == size {
+        if self.size() == size {
             return Ok(());
         }
         Err(CommandError::BadUsage(anyhow!(

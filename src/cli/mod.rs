@@ -18,6 +18,7 @@ mod line;
 mod note;
 mod notes;
 mod output;
+mod photo;
 mod play;
 mod record;
 mod recording;
@@ -71,6 +72,8 @@ enum Command {
     Grow(grow::GrowArgs),
     /// Make a tree of drawn strokes (.svg, .json).
     Sketch(sketch::SketchArgs),
+    /// Make a tree from one photograph, along strokes that are drawn on it.
+    Photo(photo::PhotoArgs),
     /// Note species, site, wind and the like on a capture, or print what is noted on it.
     Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
@@ -105,6 +108,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Animate(args) => animate::run(args),
         Command::Grow(args) => grow::run(args),
         Command::Sketch(args) => sketch::run(args),
+        Command::Photo(args) => photo::run(args),
         Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),

@@ -60,6 +60,14 @@ pub(super) fn read(dir: &Path, size: Size) -> Result<AtRest, String> {
     })
 }
 
+/// The mask of the leaves in `dir`, which must be of the picture's size.
+///
+/// # Errors
+/// As of [`read`].
+pub(super) fn leaves(dir: &Path, size: Size) -> Result<Luma, String> {
+    mask(dir, LEAVES_MASK_FILE, size)
+}
+
 fn mask(dir: &Path, name: &str, size: Size) -> Result<Luma, String> {
     let grey = picture(dir, name, size)?.into_luma8();
     Ok(Luma {

@@ -49,7 +49,8 @@ use crate::bounds::Bounds;
 use crate::config::Config;
 use crate::dynamics::Film;
 use crate::model::{
-    Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, TreeMode, Unidentified, Wood, WoodSeen,
+    Luma, Outline, Picture, Pose, Rgb, Size, Skeleton, Swaying, TreeMode, Unidentified, Wood,
+    WoodSeen,
 };
 use crate::motion::PoseEstimator;
 use motion::PoseReader;
@@ -82,6 +83,9 @@ pub struct Document {
     pub outline_at_rest: Option<Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
+    /// Where the leaves are in the picture of a tree that was photographed, not filmed: they stand as
+    /// dense as this says.
+    pub leaf_mask: Option<Arc<Luma>>,
     /// What the user should know: parts that are missing. One sentence each.
     pub warnings: Vec<String>,
 }
@@ -131,6 +135,7 @@ impl Document {
         let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
         let mut document = Self::of_parts(dir, note, nodes, picture)?;
         document.bark = document.bark_in_folder();
+        document.leaf_mask = document.leaf_mask_in_folder();
         Ok(document)
     }
 
@@ -177,6 +182,7 @@ impl Document {
             outline: None,
             outline_at_rest: None,
             bark: None,
+            leaf_mask: None,
             warnings: Vec::new(),
         };
         document.picture = document.picture_of(picture_jpg);
@@ -222,6 +228,20 @@ impl Document {
             Err(why) => {
                 self.warnings
                     .push(format!("the bark of the capture is left out: {why}"));
+                None
+            }
+        }
+    }
+
+    fn leaf_mask_in_folder(&mut self) -> Option<Arc<Luma>> {
+        if self.note.masks.is_none() || self.note.timing.frames_seen > 0 {
+            return None;
+        }
+        match at_rest::leaves(&self.dir, size(&self.note)) {
+            Ok(mask) => Some(Arc::new(mask)),
+            Err(why) => {
+                self.warnings
+                    .push(format!("the mask of the leaves is left out: {why}"));
                 None
             }
         }

@@ -14,6 +14,8 @@ pub enum ImportError {
     Unsupported { what: String, instead: String },
     #[error("it holds no strokes; draw the trunk and the branches as lines or paths")]
     NoStrokes,
+    #[error("it holds no crown; draw one closed line round it, and mark it `crown`")]
+    NoCrown,
     #[error("{what}: {why}; correct it")]
     BadStroke { what: String, why: String },
     #[error("its picture is {width}x{height} px, and must have 64 to 8192 px a side; scale it")]

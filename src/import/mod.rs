@@ -3,9 +3,13 @@
 //! A sketch ([`read_sketch`]) is a set of strokes. Where they meet they are joined to a flat tree
 //! ([`joined`]), which is stood up in space as a captured one is (Li 2011 sect. 6 and fig. 9).
 //!
+//! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_crown`] reads the
+//! line that a user draws round a crown.
+//!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
 //! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
 
+mod crown;
 mod cylinders;
 mod error;
 mod flat_tree;
@@ -23,8 +27,10 @@ mod sketch_json;
 mod svg;
 mod svg_path;
 mod svg_place;
+mod traced;
 mod treefile;
 
+pub use crown::{Crown, read_crown};
 pub use error::ImportError;
 pub use flat_tree::FlatTree;
 pub use flatten::FlatModel;
@@ -33,3 +39,4 @@ pub use join::joined;
 pub use model_file::read_model;
 pub use model_tree::{ModelNode, ModelTree};
 pub use sketch::{Sketch, Stroke, read_sketch};
+pub use traced::traced;

@@ -40,16 +40,23 @@ pub struct Sketch {
 /// It is neither, or holds no strokes; a stroke, a transform or the size cannot be read, or there
 /// are more strokes than anybody draws.
 pub fn read_sketch(bytes: &[u8]) -> Result<Sketch, ImportError> {
+    parsed(bytes)?.checked()
+}
+
+/// A sketch as it is in the file, maybe without strokes.
+///
+/// # Errors
+/// It is neither SVG nor JSON, or cannot be read.
+pub(super) fn parsed(bytes: &[u8]) -> Result<Sketch, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|_| ImportError::bad_format("it is no text"))?;
     // Some editors put a byte order mark before it.
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    let sketch = match text.chars().next() {
-        Some('{') => sketch_json::parse(text)?,
-        Some('<') => svg::parse(text)?,
-        Some(_) => return Err(ImportError::bad_format("it is neither SVG nor JSON")),
-        None => return Err(ImportError::bad_format("it is empty")),
-    };
-    sketch.checked()
+    match text.chars().next() {
+        Some('{') => sketch_json::parse(text),
+        Some('<') => svg::parse(text),
+        Some(_) => Err(ImportError::bad_format("it is neither SVG nor JSON")),
+        None => Err(ImportError::bad_format("it is empty")),
+    }
 }
 
 /// The size of a picture with these sides, px.

@@ -1,10 +1,12 @@
-//! Which pixels are tree: a polygon, a mask image, scribbles, or found by itself.
+//! Which pixels are tree: a polygon, a mask image, scribbles, or found by itself, in a film by its
+//! motion, in one picture in its middle.
 
 mod auto;
 mod density;
 mod error;
 mod laplacian;
 mod matting;
+mod middle;
 mod polygon;
 mod region;
 mod scribbles;
@@ -17,6 +19,7 @@ pub use auto::{AutoOutline, Found, whole};
 pub use density::{DensityError, density};
 pub use error::OutlineError;
 pub use matting::{alpha, outline as from_scribbles};
+pub use middle::{InMiddle, in_middle};
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
 pub use scribbles::{Given, Mark, Scribbles};
 
@@ -88,7 +91,16 @@ pub fn parse(text: &str, name: String, size: Size) -> Result<Outline, OutlineErr
 /// # Errors
 /// The region is empty.
 pub fn in_one_piece(region: &Outline) -> Result<Outline, OutlineError> {
-    let found = region::close_to_one(region.size, &region.mask, 0);
+    closed(region.size, &region.mask, 0)
+}
+
+/// The largest piece of a mask (255 or 0, row by row, of a picture of this `size`) whose gaps of up
+/// to `close_px` are closed, its holes filled, with its border as a polygon.
+///
+/// # Errors
+/// The mask is empty.
+pub fn closed(size: Size, mask: &[u8], close_px: u32) -> Result<Outline, OutlineError> {
+    let found = region::close_to_one(size, mask, close_px);
     found
         .map_err(OutlineError::bad_polygon)?
         .ok_or_else(|| OutlineError::bad_polygon("it is empty"))

@@ -14,6 +14,7 @@ mod images;
 mod interface;
 mod loopback;
 mod opened;
+mod photograph;
 mod probe;
 mod recording;
 #[cfg(feature = "nokhwa")]
@@ -29,6 +30,7 @@ pub use error::{SourceError, group_name};
 pub use identity::{Identity, Places};
 pub use interface::{Health, Source, SourceInfo, Successor};
 pub use loopback::Loopback;
+pub use photograph::{Photograph, PhotographError};
 
 use crate::config;
 use std::os::unix::fs::FileTypeExt;

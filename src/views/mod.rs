@@ -8,6 +8,7 @@ mod forest;
 mod forest_plan;
 mod loops;
 mod offspring;
+mod photo;
 mod prepared;
 mod studio;
 mod tables;
@@ -20,6 +21,7 @@ pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
 };
+pub use photo::{PhotoDepth, PhotoGrowth, PhotoParts, PhotoTree, photo_defaults};
 pub use prepared::{PreparedTree, TreeOptions};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;

@@ -77,6 +77,9 @@ impl DocumentWriter {
         );
         // A PNG gives back what was put in.
         document.bark = draft.bark.cloned();
+        let is_photo = document.note.timing.frames_seen == 0;
+        let at_rest = draft.at_rest.filter(|_| is_photo);
+        document.leaf_mask = at_rest.map(|at_rest| Arc::new(at_rest.masks.leaves.clone()));
         let options = TreeOptions {
             config,
             ..TreeOptions::default()

@@ -296,7 +296,7 @@ impl Clues<'_> {
 
 /// What it costs that neighbours differ: little where their colours do (Boykov and Jolly 2001).
 /// Nothing links what is beyond the region.
-fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
+pub(super) fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
     let apart = |i: usize, pair: usize| {
         let next = neighbour(i, pair, size).filter(|next| region[i] != 0 && region[*next] != 0)?;
         Some((colour(&pixels[i]) - colour(&pixels[next])).norm_squared())
@@ -340,7 +340,7 @@ const LEAST_BARK: usize = 64;
 
 /// A part of a picture, the ends not included, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Part {
+pub(super) struct Part {
     left: u32,
     top: u32,
     right: u32,
@@ -349,7 +349,7 @@ struct Part {
 
 impl Part {
     /// The smallest part that holds all of the region; `None` where it is empty.
-    fn holding(region: &[u8], size: Size) -> Option<Self> {
+    pub fn holding(region: &[u8], size: Size) -> Option<Self> {
         let [left, top, last_u, last_v] = bounds_px(region, size)?;
         Some(Self {
             left,
@@ -412,7 +412,7 @@ impl Part {
 }
 
 /// The picture at the larger size, blue first, as OpenCV has it.
-fn enlarged_picture(picture: &Rgb, large: Size) -> opencv::Result<Mat> {
+pub(super) fn enlarged_picture(picture: &Rgb, large: Size) -> opencv::Result<Mat> {
     let mut bgr = Mat::default();
     cvt_color_def(&colour_mat(picture)?, &mut bgr, COLOR_RGB2BGR)?;
     let mut out = Mat::default();
@@ -446,7 +446,7 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
 }
 
 /// Which pixels of the mask `wood` the strokes are drawn on.
-fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
+pub(super) fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
     let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
     let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
     for stroke in strokes {
@@ -549,13 +549,13 @@ fn contrast(pixels: &[Vec3b]) -> f64 {
     (variance / 3.0).max(0.0).sqrt()
 }
 
-fn colour(pixel: &Vec3b) -> Vector3<f64> {
+pub(super) fn colour(pixel: &Vec3b) -> Vector3<f64> {
     Vector3::from(pixel.0.map(f64::from))
 }
 
 /// What a disc of [`LIMB_PX`] fits into (opening): in leaf, thin wood cannot be distinguished from
 /// the mixed colours at the edges of leaves.
-fn wide(mask: &[u8], size: Size) -> opencv::Result<Vec<bool>> {
+pub(super) fn wide(mask: &[u8], size: Size) -> opencv::Result<Vec<bool>> {
     let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
     let side = limb_width(size).round() as i32 | 1;
     let middle = Point::new(-1, -1);
@@ -573,7 +573,7 @@ fn limb_width(size: Size) -> f64 {
 /// Makes the holes of a mask wood that are no larger than half a limb is wide, as a knot or a light
 /// on the bark is: the widths of limbs would be measured too small beside them. Wood of that size
 /// that is joined to no other is none.
-fn without_specks(mask: &mut [u8], size: Size) -> opencv::Result<()> {
+pub(super) fn without_specks(mask: &mut [u8], size: Size) -> opencv::Result<()> {
     let most = (0.5 * limb_width(size)).powi(2) as usize;
     let holes: Vec<u8> = mask.iter().map(|m| 255 - m).collect();
     let is_hole = Parts::of(&holes, size, 4)?.no_larger_than(most);
@@ -588,7 +588,7 @@ fn without_specks(mask: &mut [u8], size: Size) -> opencv::Result<()> {
 }
 
 /// The parts of a mask whose pixels are joined.
-struct Parts {
+pub(super) struct Parts {
     /// Number of each pixel's part, row by row.
     of_pixel: Vec<usize>,
     count: usize,
@@ -599,7 +599,7 @@ impl Parts {
     const OUTSIDE: usize = 0;
 
     /// Pixels are joined to their 4 or 8 neighbours, as `connectivity` says.
-    fn of(mask: &[u8], size: Size, connectivity: i32) -> opencv::Result<Self> {
+    pub fn of(mask: &[u8], size: Size, connectivity: i32) -> opencv::Result<Self> {
         let mat = Mat::new_rows_cols_with_data(size.height as i32, size.width as i32, mask)?;
         let mut parts = Mat::default();
         let count = connected_components(&mat, &mut parts, connectivity, CV_32S)?;
@@ -611,7 +611,7 @@ impl Parts {
     }
 
     /// Whether each pixel is in a part of at most so many pixels.
-    fn no_larger_than(&self, most: usize) -> Vec<bool> {
+    pub fn no_larger_than(&self, most: usize) -> Vec<bool> {
         let mut area = vec![0_usize; self.count];
         for part in &self.of_pixel {
             area[*part] += 1;
@@ -624,7 +624,12 @@ impl Parts {
 
 /// Which pixels within `bounds` are on a ridge that is narrower than [`RIDGE_PX`]. Whether wood is
 /// darker or brighter than what stands behind it is estimated from the pixels that move.
-fn ridges(rest: &Mat, bounds: Part, moves: &[bool], size: Size) -> opencv::Result<Vec<bool>> {
+pub(super) fn ridges(
+    rest: &Mat,
+    bounds: Part,
+    moves: &[bool],
+    size: Size,
+) -> opencv::Result<Vec<bool>> {
     let width_px = RIDGE_PX * f64::from(size.width) / 640.0;
     let mut grey = Mat::default();
     cvt_color_def(rest, &mut grey, opencv::imgproc::COLOR_BGR2GRAY)?;

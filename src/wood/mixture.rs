@@ -1,10 +1,12 @@
 //! Colours of wood and of all else, as mixtures of normal distributions (Tan et al. 2008
-//! sect. 2.1), which OpenCV learns from pixels that are known.
+//! sect. 2.1), which OpenCV learns from pixels that are known; and such of any number of parts.
 
+use crate::random::Generator;
 use nalgebra::{Matrix3, Vector3};
 use opencv::core::{Mat, Rect, Vec3b};
 use opencv::imgproc::{GC_BGD, GC_FGD, GC_INIT_WITH_MASK, grab_cut};
 use opencv::prelude::*;
+use rand::RngExt;
 
 /// Normal distributions of a mixture of OpenCV's.
 const PARTS: usize = 5;
@@ -19,6 +21,13 @@ const ROUNDING: f64 = 1.0 / 12.0;
 const LEAST_SEEDS: usize = 64;
 /// Least density that is believed: a colour that was never seen.
 const LEAST_DENSITY: f64 = 1e-30;
+
+/// Rounds in which a mixture of any number of parts is learned.
+const ROUNDS: usize = 25;
+/// A part that fewer colours than this have together is none.
+const LEAST_WEIGHT: f64 = 4.0;
+/// Least deviation of a part, grey levels.
+const LEAST_DEVIATION: f64 = 1.0;
 
 /// What is known of a pixel before its colour is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,19 +90,102 @@ impl Mixtures {
 }
 
 /// A mixture of normal distributions.
-struct Mixture {
-    parts: Vec<Normal>,
+pub struct Mixture {
+    pub parts: Vec<Normal>,
 }
 
 /// A normal distribution and its share of a mixture.
-struct Normal {
+#[derive(Clone, Debug)]
+pub struct Normal {
+    /// Share of the mixture, 0 to 1.
+    pub share: f64,
+    pub mean: Vector3<f64>,
     /// Its share by the density at its mean, without the factor that all have.
     height: f64,
-    mean: Vector3<f64>,
     precision: Matrix3<f64>,
 }
 
+impl Normal {
+    /// `None` where the covariance cannot be inverted.
+    fn of(share: f64, mean: Vector3<f64>, covariance: &Matrix3<f64>) -> Option<Self> {
+        Some(Self {
+            share,
+            mean,
+            height: share / covariance.determinant().max(f64::MIN_POSITIVE).sqrt(),
+            precision: covariance.try_inverse()?,
+        })
+    }
+
+    /// Without the factor that all mixtures have.
+    fn density(&self, colour: &Vector3<f64>) -> f64 {
+        let off = colour - self.mean;
+        self.height * (-0.5 * off.dot(&(self.precision * off))).exp()
+    }
+}
+
 impl Mixture {
+    /// A mixture of at most `parts` normal distributions of these colours (Dempster, Laird and Rubin
+    /// 1977), begun at means that lie apart (Arthur and Vassilvitskii 2007). It has none where there
+    /// are fewer colours than parts.
+    pub fn learned(colours: &[Vector3<f64>], parts: usize, random: &mut Generator) -> Self {
+        if colours.len() < parts {
+            return Self { parts: Vec::new() };
+        }
+        let means = means_apart(colours, parts, random);
+        let nearest_of = |colour: &Vector3<f64>| nearest(&means, colour);
+        let mut mixture = Self::of_shares(colours, parts, |i, k| {
+            f64::from(u8::from(nearest_of(&colours[i]) == k))
+        });
+        for _ in 0..ROUNDS {
+            let mut shares = Vec::with_capacity(colours.len() * mixture.parts.len());
+            for colour in colours {
+                let of_all = mixture.density(colour);
+                let parts = mixture.parts.iter();
+                shares.extend(parts.map(|part| part.density(colour) / of_all));
+            }
+            let n_parts = mixture.parts.len();
+            mixture = Self::of_shares(colours, n_parts, |i, k| shares[i * n_parts + k]);
+        }
+        mixture
+    }
+
+    /// The normal distributions of colours of which each has a share in each part.
+    fn of_shares(
+        colours: &[Vector3<f64>],
+        parts: usize,
+        share: impl Fn(usize, usize) -> f64,
+    ) -> Self {
+        let mut learned = Vec::with_capacity(parts);
+        for k in 0..parts {
+            let (mut weight, mut sum, mut squares) = (0.0, Vector3::zeros(), Matrix3::zeros());
+            for (i, colour) in colours.iter().enumerate() {
+                let share = share(i, k);
+                weight += share;
+                sum += share * colour;
+                squares += share * colour * colour.transpose();
+            }
+            if weight < LEAST_WEIGHT {
+                continue;
+            }
+            let mean = sum / weight;
+            let floor = LEAST_DEVIATION.powi(2) * Matrix3::identity();
+            let covariance = squares / weight - mean * mean.transpose() + floor;
+            learned.extend(Normal::of(weight / colours.len() as f64, mean, &covariance));
+        }
+        Self { parts: learned }
+    }
+
+    /// The mixture of these parts alone; their shares add up to 1.
+    pub fn of_parts(parts: &[Normal]) -> Self {
+        let all: f64 = parts.iter().map(|part| part.share).sum();
+        let mut own = parts.to_vec();
+        for part in &mut own {
+            part.share /= all.max(f64::MIN_POSITIVE);
+            part.height /= all.max(f64::MIN_POSITIVE);
+        }
+        Self { parts: own }
+    }
+
     /// One of OpenCV's, whose numbers these are.
     fn of(numbers: &[f64]) -> Self {
         let mut parts = Vec::with_capacity(PARTS);
@@ -104,32 +196,52 @@ impl Mixture {
             let mean = Vector3::from_column_slice(&numbers[MEANS + 3 * k..][..3]);
             let covariance = Matrix3::from_row_slice(&numbers[COVARIANCES + 9 * k..][..9]);
             let covariance = covariance + ROUNDING * Matrix3::identity();
-            let Some(precision) = covariance.try_inverse() else {
-                continue;
-            };
-            parts.push(Normal {
-                height: numbers[k] / covariance.determinant().max(f64::MIN_POSITIVE).sqrt(),
-                mean,
-                precision,
-            });
+            parts.extend(Normal::of(numbers[k], mean, &covariance));
         }
         Self { parts }
     }
 
     /// Without the factor that all mixtures have.
-    fn density(&self, colour: &Vector3<f64>) -> f64 {
-        let mut density = LEAST_DENSITY;
-        for part in self.parts.iter().filter(|part| part.height > 0.0) {
-            let off = colour - part.mean;
-            density += part.height * (-0.5 * off.dot(&(part.precision * off))).exp();
-        }
-        density
+    pub fn density(&self, colour: &Vector3<f64>) -> f64 {
+        let parts = self.parts.iter().filter(|part| part.height > 0.0);
+        LEAST_DENSITY + parts.map(|part| part.density(colour)).sum::<f64>()
     }
+}
+
+/// So many of the colours, each drawn with its squared distance from those before it.
+fn means_apart(
+    colours: &[Vector3<f64>],
+    count: usize,
+    random: &mut Generator,
+) -> Vec<Vector3<f64>> {
+    let mut means = vec![colours[random.random_range(0..colours.len())]];
+    let mut apart = vec![f64::INFINITY; colours.len()];
+    while means.len() < count {
+        let newest = means[means.len() - 1];
+        for (apart, colour) in apart.iter_mut().zip(colours) {
+            *apart = apart.min((colour - newest).norm_squared());
+        }
+        let mut left = random.random::<f64>() * apart.iter().sum::<f64>();
+        let drawn = apart.iter().position(|apart| {
+            left -= apart;
+            left <= 0.0
+        });
+        means.push(colours[drawn.unwrap_or(0)]);
+    }
+    means
+}
+
+/// Which of the means is nearest to a colour.
+fn nearest(means: &[Vector3<f64>], colour: &Vector3<f64>) -> usize {
+    let squared = |k: usize| (means[k] - colour).norm_squared();
+    let order = |a: &usize, b: &usize| squared(*a).total_cmp(&squared(*b));
+    (0..means.len()).min_by(order).unwrap_or(0)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::generator;
 
     #[test]
     fn colours_speak_for_what_they_were_seen_in() {
@@ -150,5 +262,41 @@ mod tests {
         assert!(odds([0, 255, 0]).abs() < 1e-6);
         let few = Mixtures::of(&pixels[..60], &seeds[..60]).expect("opencv");
         assert!(few.is_none());
+    }
+
+    #[test]
+    fn the_parts_of_a_mixture_are_found() {
+        let means = [
+            [40.0, 60.0, 50.0],
+            [200.0, 210.0, 190.0],
+            [90.0, 160.0, 60.0],
+        ];
+        let mut random = generator(3, 0);
+        let mut colours = Vec::new();
+        for k in 0..3000 {
+            // Half of all are of the first.
+            let mean = Vector3::from(means[[0, 1, 0, 2][k % 4]]);
+            let noise = Vector3::from_fn(|_, _| random.random_range(-8.0..8.0));
+            colours.push(mean + noise);
+        }
+        let mixture = Mixture::learned(&colours, 3, &mut random);
+        assert_eq!(mixture.parts.len(), 3);
+        for (mean, share) in means.iter().zip([0.5, 0.25, 0.25]) {
+            let mean = Vector3::from(*mean);
+            let found = mixture.parts.iter().find(|p| (p.mean - mean).norm() < 1.5);
+            assert!(
+                found.is_some_and(|p| (p.share - share).abs() < 0.01),
+                "{mean}"
+            );
+        }
+        let alone = Mixture::of_parts(&mixture.parts[..1]);
+        assert!((alone.parts[0].share - 1.0).abs() < 1e-12);
+        assert!(
+            Mixture::learned(&colours[..2], 3, &mut random)
+                .parts
+                .is_empty()
+        );
+        let same = Mixture::learned(&[Vector3::repeat(9.0); 40], 3, &mut random);
+        assert!(same.density(&Vector3::repeat(9.0)).is_finite());
     }
 }

@@ -5,7 +5,8 @@
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
 //! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
-//! Strokes help where colour does not.
+//! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
+//! strokes in place of motion; [`foliage`] finds its leaves.
 
 mod bark;
 mod circles;
@@ -13,11 +14,16 @@ mod crossings;
 mod cut;
 mod evidence;
 mod faint;
+mod foliage;
 mod mask;
 mod mixture;
 mod paths;
+mod photograph;
 mod probability;
 mod steady;
+
+pub use foliage::LeafColour;
+pub use photograph::{Photograph, SeenInPhotograph, in_photograph};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;

@@ -73,6 +73,21 @@ pub fn masks(wood: &WoodMask, evidence: &Evidence) -> opencv::Result<Masks> {
     })
 }
 
+/// The mask of wood alone, of a picture of this size.
+pub fn mask_of_wood(wood: &WoodMask, size: Size) -> Luma {
+    let mut pixels = Vec::with_capacity(size.area());
+    for i in 0..size.area() {
+        let own = wood.pixels_of(i, size);
+        let is_sought = own.clone().any(|pixel| wood.odds[pixel].is_finite());
+        pixels.push(if is_sought {
+            probability_of_wood(wood, own)
+        } else {
+            0
+        });
+    }
+    Luma { size, pixels }
+}
+
 /// The probability that the `pixels` of the mask, which are one pixel of the picture, are wood, in
 /// 255ths: the mean of theirs, on the side that most of them were cut to.
 fn probability_of_wood(wood: &WoodMask, pixels: impl Iterator<Item = usize>) -> u8 {

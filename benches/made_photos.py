@@ -1,0 +1,104 @@
+#!/usr/bin/env python3
+"""Photographs of made-up trees whose wood, leaves and shape in space are known.
+
+  made_photos.py OUT_DIR NAME SEED leaves|bare [--width PX]
+
+The trees, the scenery and the drawing are those of made_films.py: one frame, of a tree at rest, in the size of a photograph.
+The same seed gives the same photograph. Writes to OUT_DIR/NAME:
+  photo.jpg      the photograph, 1500 px wide by default, JPEG
+  crown.json     a crown stroke round the leaves, or round the bare tree above its first fork, as drawn by hand
+  trunk.json     a branch stroke along the trunk, from the foot up, as drawn by hand
+  truth.json     camera (orthographic), and of each branch the parent, rest shape (m), radius at each point (px), whether it is
+                 seen there
+  wood.png       how much of each pixel shows wood, 0 to 255; leaves.png: the same of leaves
+
+Needs numpy, scipy and opencv-python-headless. About 10 s of one core.
+"""
+import argparse, json
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from made_films import picture
+
+JPEG_QUALITY = 92
+UNSTEADY_PX = 2.0  # how far a hand is off the line that it follows, at 1500 px width
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out_dir", type=Path)
+    parser.add_argument("name")
+    parser.add_argument("seed", type=int)
+    parser.add_argument("look", choices=["leaves", "bare"])
+    parser.add_argument("--width", type=int, default=1500)
+    args = parser.parse_args()
+    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.width)
+
+
+def make(folder, seed, leafy, width):
+    picture.enlarge(width / picture.WIDTH)
+    # They take the size of the picture when they are loaded.
+    from made_films import motion, scenery, surface, tree, truth
+
+    rng = np.random.default_rng(seed)
+    branches, _ = tree.grow(rng, leafy)
+    rest = motion.Pose(branches, np.zeros((1, len(branches), 2)))
+    camera = picture.Camera.framing(rng, rest.points_m)
+    skin = surface.without_flutter(surface.cover(rng, branches, rest, leafy))
+    small = scenery.scenery(rng, leafy, picture.FILM_WIDTH, picture.FILM_HEIGHT)
+    background = cv2.resize(small, (picture.WIDTH, picture.HEIGHT), interpolation=cv2.INTER_CUBIC)
+    seen = truth.facet_map(skin, rest, camera, np.zeros((picture.FINE * picture.HEIGHT, picture.FINE * picture.WIDTH), bool))
+    facts = truth.widths(branches, skin, rest, camera, seen)
+    film = dict(clip=folder.name, renderer="benches/made_photos.py", tree=f"made up, seed {seed}", width=picture.WIDTH,
+                height=picture.HEIGHT, coordinates=truth.COORDINATES, camera=truth.of_camera(camera),
+                motion=dict(leaf_flutter_rad=1.0 if leafy else 0.0),
+                branches=truth.of_branches(branches, rest, camera, np.zeros(0, int), facts))
+
+    folder.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(folder / "photo.jpg"), photograph(rng, background, skin, rest, camera),
+                [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    for name, mask in zip(["wood.png", "leaves.png"], truth.masks(skin, seen)):
+        cv2.imwrite(str(folder / name), mask)
+    leaves = (seen >= 0) & skin.two_sided[seen]
+    (folder / "crown.json").write_text(json.dumps(crown(leaves if leafy else seen >= 0, branches, camera)))
+    (folder / "trunk.json").write_text(json.dumps(trunk(rng, branches, camera)))
+    (folder / "truth.json").write_text(json.dumps(film))
+
+
+def photograph(rng, background, skin, pose, camera):
+    """(height, width, 3) bytes, blue green red."""
+    canvas = picture.fine_canvas(background)
+    colours = [tuple(map(float, c)) for c in np.clip(skin.colour, 0, 255)]
+    picture.draw(canvas, skin, skin.vertices_m(pose, 0, 0.0), camera, colours)
+    image = cv2.resize(canvas, (picture.WIDTH, picture.HEIGHT), interpolation=cv2.INTER_AREA).astype(np.float32)
+    image += rng.normal(0, picture.NOISE_SIGMA, image.shape)
+    return np.clip(image + 0.5, 0, 255).astype(np.uint8)
+
+
+def crown(seen, branches, camera):
+    """A crown stroke: the leaves, or the bare tree above its first fork, with a margin."""
+    tree = cv2.resize(seen.astype(np.uint8), (picture.WIDTH, picture.HEIGHT), interpolation=cv2.INTER_AREA)
+    forks = [b.nodes_m[0] for b in branches if b.parent == 0]
+    low_v = max(camera.project(np.array(forks))[:, 1])
+    tree[int(low_v) :] = 0
+    px = picture.WIDTH / 640
+    disc = lambda d: cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (int(d * px) | 1, int(d * px) | 1))
+    pad = int(40 * px)
+    wide = cv2.copyMakeBorder(tree, pad, pad, pad, pad, cv2.BORDER_CONSTANT)
+    wide = cv2.erode(cv2.dilate(wide, disc(41)), disc(27))[pad:-pad, pad:-pad]
+    contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    polygon = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 3.0 * px, True)[:, 0]
+    return {"width": picture.WIDTH, "height": picture.HEIGHT, "polygon_px": polygon.tolist()}
+
+
+def trunk(rng, branches, camera):
+    """A branch stroke along the trunk."""
+    line_px = camera.project(branches[0].nodes_m)
+    line_px += rng.normal(0, UNSTEADY_PX * picture.WIDTH / 1500, line_px.shape)
+    return {"width": picture.WIDTH, "height": picture.HEIGHT, "polyline_px": np.round(line_px, 1).tolist()}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,631 @@
+//! A tree is grown from the branches that a picture shows, by subtrees of a library on ever more of
+//! its branches (Tan et al. 2008 sect. 3).
+//!
+//! Each round takes some branches, thick and old ones first, tries all subtrees on them in twelve
+//! turns, and keeps the one that brings the attractors nearest: in the picture and in space in turns.
+//! What would leave the tree in the picture, or its room in space, or come too near to a branch is
+//! pruned before it counts.
+
+use super::attractors::Attractors;
+use super::library::{Library, Subtree};
+use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
+use crate::random::Generator;
+use nalgebra::{Point2, Point3, Rotation3, Unit, Vector3};
+use rand::RngExt;
+use std::f64::consts::TAU;
+
+/// Rounds (Tan et al. 2008 sect. 3.1: about 100 times).
+pub const ROUNDS: usize = 100;
+/// Branches that are tried in a round, and turns about them (Tan et al. 2008 sect. 3.1).
+const CANDIDATES: usize = 8;
+const TURNS: u32 = 12;
+/// Rounds without a gain after which the growth ends.
+const IDLE_ROUNDS: usize = 12;
+/// Least gain of a round for each new branch, by the distance between attractors in the picture.
+const LEAST_GAIN: f64 = 2.0;
+/// Nothing grows on a branch shorter than this share of the tree's height.
+const SHORTEST: f64 = 0.02;
+/// A new branch ends at least this share of its length away from all other branches.
+const CLEAR: f64 = 0.2;
+/// Places along a branch at which its distance from attractors is looked at, and whether it is
+/// inside.
+const SAMPLES: u32 = 3;
+const LOOKED_AT: u32 = 5;
+/// A place nearer than this share of its branch's length to a joint is that joint.
+const SAME_JOINT: f64 = 0.08;
+/// Generations of branches on the trunk, at most.
+const MOST_GENERATIONS: u32 = 8;
+
+/// Where a tree may grow.
+pub struct GrowthRegion<'a> {
+    /// Where the tree is in the picture, its small gaps closed.
+    pub tree: &'a Outline,
+    /// Whether a branch may run from one place to another (model axes, px).
+    pub room: &'a dyn Fn(&Point3<f64>, &Point3<f64>) -> bool,
+    /// The attractors in space are used, too; without them the tree is flat from the side (Tan et al.
+    /// 2008 fig. 6).
+    pub in_space: bool,
+    /// Radius of the thinnest branch, px.
+    pub tip_px: f64,
+}
+
+/// What became of a growth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Growth {
+    pub branches: usize,
+    pub rounds: usize,
+    /// How far the attractors in the picture are from a branch in their mean, before and after, px.
+    pub before_px: f64,
+    pub after_px: f64,
+}
+
+/// Grows branches on those of `tree`, which has no copies. They are of the kind `grown`, and stand
+/// after all others.
+pub fn grow_subtrees(
+    tree: &mut Skeleton,
+    library: &Library,
+    region: &GrowthRegion,
+    rounds: usize,
+    random: &mut Generator,
+) -> Growth {
+    let mut engine = Engine::new(tree, library, region);
+    let before_px = engine.in_picture.mean_px();
+    let (mut idle, mut done) = (0, 0);
+    while done < rounds && idle < IDLE_ROUNDS {
+        let in_space = region.in_space && done % 2 == 1 && !engine.in_space.is_empty();
+        let has_grown = engine.round(in_space, random);
+        idle = if has_grown { 0 } else { idle + 1 };
+        done += 1;
+    }
+    let growth = Growth {
+        branches: engine.branches.iter().filter(|b| b.is_grown).count(),
+        rounds: done,
+        before_px,
+        after_px: engine.in_picture.mean_px(),
+    };
+    *tree = engine.skeleton();
+    growth
+}
+
+/// A joint of the tree while it grows.
+#[derive(Clone, Debug)]
+struct Joint {
+    /// The joint below it; places in the list say nothing of the order.
+    parent: Option<usize>,
+    at: Point3<f64>,
+    radius: f64,
+    /// The branch that it is the end or a bend of.
+    branch: usize,
+    /// As it is in the tree from the picture; `None` where it is new.
+    own: Option<Node>,
+}
+
+/// A branch: from the joint where it begins over its bends to its end.
+#[derive(Clone, Debug)]
+struct Branch {
+    begin: usize,
+    end: usize,
+    generation: u32,
+    is_grown: bool,
+}
+
+/// A branch that may be added.
+#[derive(Clone, Copy, Debug)]
+struct Shoot {
+    /// The shoot that carries it; `None`: the supporting branch.
+    on: Option<usize>,
+    at: f64,
+    from: Point3<f64>,
+    to: Point3<f64>,
+    radius_share: f64,
+}
+
+/// Shoots on a branch, and what they are worth.
+struct Candidate {
+    branch: usize,
+    shoots: Vec<Shoot>,
+    gain: f64,
+}
+
+struct Engine<'a> {
+    library: &'a Library,
+    region: &'a GrowthRegion<'a>,
+    foot_px: Point2<f64>,
+    tree: &'a Skeleton,
+    height_px: f64,
+    joints: Vec<Joint>,
+    branches: Vec<Branch>,
+    /// Places along all branches.
+    samples: Vec<Point3<f64>>,
+    in_picture: Attractors,
+    in_space: Attractors,
+}
+
+impl<'a> Engine<'a> {
+    fn new(tree: &'a Skeleton, library: &'a Library, region: &'a GrowthRegion<'a>) -> Self {
+        let mut engine = Self {
+            library,
+            region,
+            foot_px: tree.foot_px,
+            tree,
+            height_px: tree.nodes.iter().map(|n| n.position.y).fold(1.0, f64::max),
+            joints: Vec::with_capacity(tree.nodes.len()),
+            branches: Vec::new(),
+            samples: Vec::new(),
+            in_picture: Attractors::in_picture(region.tree, tree.foot_px),
+            in_space: Attractors::in_space(),
+        };
+        let mut branch_of = vec![0; tree.nodes.len()];
+        for moving in tree.moving_branches() {
+            let place = engine.branches.len();
+            moving
+                .parts()
+                .for_each(|part| branch_of[part.index()] = place);
+            let generation = tree.carriers(moving.node).count().max(1) as u32;
+            engine.branches.push(Branch {
+                begin: moving.begin.index(),
+                end: moving.node.index(),
+                generation,
+                is_grown: false,
+            });
+        }
+        for (i, node) in tree.nodes.iter().enumerate() {
+            engine.joints.push(Joint {
+                parent: node.parent.map(|p| p.index()),
+                at: node.position,
+                radius: node.radius,
+                branch: branch_of[i],
+                own: Some(node.clone()),
+            });
+        }
+        let mut samples = Vec::new();
+        for joint in &engine.joints {
+            if let Some(parent) = joint.parent {
+                sample(engine.joints[parent].at, joint.at, &mut samples);
+            }
+        }
+        engine.take(samples);
+        let joints: Vec<Point3<f64>> = engine.joints[1..].iter().map(|j| j.at).collect();
+        joints
+            .into_iter()
+            .for_each(|at| engine.attract_quarter_turned(at));
+        engine
+    }
+
+    /// Takes in samples of new branches.
+    fn take(&mut self, samples: Vec<Point3<f64>>) {
+        self.in_picture.take(&samples);
+        self.in_space.take(&samples);
+        self.samples.extend(samples);
+    }
+
+    /// Adds a joint, turned by 90 degrees about the middle of the tree at its height, to the attractors
+    /// in space, if the tree may grow there. The paper turns it about the trunk; of a tree that is not
+    /// the same to both sides that lies outside.
+    fn attract_quarter_turned(&mut self, joint: Point3<f64>) {
+        let middle = self.middle_x(joint.y);
+        let turned = Point3::new(middle + joint.z, joint.y, -(joint.x - middle));
+        if (self.region.room)(&turned, &turned) {
+            self.in_space.add(turned, &self.samples);
+        }
+    }
+
+    /// The middle of the tree in the picture at a height, model axes, px.
+    fn middle_x(&self, y: f64) -> f64 {
+        let tree = self.region.tree;
+        let v = (self.foot_px.y - y)
+            .round()
+            .clamp(0.0, f64::from(tree.size.height - 1)) as u32;
+        let first = (0..tree.size.width).find(|u| tree.has(*u, v));
+        let last = (0..tree.size.width).rev().find(|u| tree.has(*u, v));
+        match (first, last) {
+            (Some(first), Some(last)) => 0.5 * f64::from(first + last) - self.foot_px.x,
+            _ => 0.0,
+        }
+    }
+
+    /// One replacement; `false` where none brings anything.
+    fn round(&mut self, in_space: bool, random: &mut Generator) -> bool {
+        let mut best: Option<Candidate> = None;
+        for branch in self.chosen(random) {
+            for subtree in self.library.subtrees() {
+                for turn in 0..TURNS {
+                    let shoots = self.pruned(branch, subtree, turn);
+                    if shoots.is_empty() {
+                        continue;
+                    }
+                    let samples = samples_of(&shoots);
+                    let gain = match in_space {
+                        true => self.in_space.gain(&samples),
+                        false => self.in_picture.gain(&samples),
+                    };
+                    if best.as_ref().is_none_or(|best| gain > best.gain) {
+                        best = Some(Candidate {
+                            branch,
+                            shoots,
+                            gain,
+                        });
+                    }
+                }
+            }
+        }
+        let least_px = LEAST_GAIN * self.in_picture.step_px;
+        match best {
+            Some(best) if best.gain > least_px * best.shoots.len() as f64 => {
+                self.add(&best);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Branches that are tried: through all from the thickest on, each taken with a probability of one
+    /// by its generation.
+    fn chosen(&self, random: &mut Generator) -> Vec<usize> {
+        let mut by_radius: Vec<usize> = (0..self.branches.len())
+            .filter(|b| self.vector(*b).norm() >= SHORTEST * self.height_px)
+            .filter(|b| self.branches[*b].generation < MOST_GENERATIONS)
+            .collect();
+        let radius = |b: usize| self.joints[self.branches[b].end].radius;
+        by_radius.sort_by(|a, b| radius(*b).total_cmp(&radius(*a)).then(a.cmp(b)));
+        let mut chosen = Vec::with_capacity(CANDIDATES);
+        for branch in by_radius {
+            if chosen.len() == CANDIDATES {
+                break;
+            }
+            let generation = self.branches[branch].generation;
+            if random.random_range(0..generation.max(1)) == 0 {
+                chosen.push(branch);
+            }
+        }
+        chosen
+    }
+
+    /// From where a branch begins to its end.
+    fn vector(&self, branch: usize) -> Vector3<f64> {
+        let Branch { begin, end, .. } = self.branches[branch];
+        self.joints[end].at - self.joints[begin].at
+    }
+
+    /// The branches of a subtree on a branch that are neither outside nor too near to others.
+    fn pruned(&self, branch: usize, subtree: &Subtree, turn: u32) -> Vec<Shoot> {
+        let axis = self.vector(branch);
+        let Some(along) = Unit::try_new(axis, 1e-9) else {
+            return Vec::new();
+        };
+        let begin = self.joints[self.branches[branch].begin].at;
+        let upright = Rotation3::rotation_between(&Vector3::y(), &along)
+            .unwrap_or(Rotation3::from_axis_angle(&Vector3::x_axis(), TAU / 2.0));
+        let angle = TAU * f64::from(turn) / f64::from(TURNS);
+        let place = Rotation3::from_axis_angle(&along, angle) * upright;
+        let mut shoots: Vec<Shoot> = Vec::with_capacity(subtree.branches.len());
+        let mut place_of: Vec<Option<usize>> = Vec::with_capacity(subtree.branches.len());
+        for own in &subtree.branches {
+            let on = own.on.map(|on| place_of[on]);
+            let from = match on {
+                None => self.along(branch, own.at).unwrap_or(begin + own.at * axis),
+                Some(None) => {
+                    place_of.push(None);
+                    continue;
+                }
+                Some(Some(on)) => shoots[on].from + own.at * (shoots[on].to - shoots[on].from),
+            };
+            let shoot = Shoot {
+                on: on.flatten(),
+                at: own.at,
+                from,
+                to: from + place * own.way * axis.norm(),
+                radius_share: own.radius_share,
+            };
+            if self.is_free(&shoot, &shoots) {
+                place_of.push(Some(shoots.len()));
+                shoots.push(shoot);
+            } else {
+                place_of.push(None);
+            }
+        }
+        shoots
+    }
+
+    /// Whether a shoot is inside, and ends clear of all branches and of its neighbours.
+    fn is_free(&self, shoot: &Shoot, others: &[Shoot]) -> bool {
+        let way = shoot.to - shoot.from;
+        let appears_inside = |k: &u32| {
+            let at = shoot.from + way * (f64::from(*k) / f64::from(LOOKED_AT));
+            let [u, v] = [self.foot_px.x + at.x, self.foot_px.y - at.y];
+            self.region.tree.contains(u, v)
+        };
+        if shoot.to.y < 0.0 || !(1..=LOOKED_AT).all(|k| appears_inside(&k)) {
+            return false;
+        }
+        if !(self.region.room)(&shoot.from, &shoot.to) {
+            return false;
+        }
+        let clear_sq = (CLEAR * way.norm()).powi(2);
+        let is_near = |at: &Point3<f64>| (at - shoot.to).norm_squared() < clear_sq;
+        !others.iter().any(|other| is_near(&other.to)) && !self.samples.iter().any(is_near)
+    }
+
+    /// The place at a share of a branch's length along its bends.
+    fn along(&self, branch: usize, share: f64) -> Option<Point3<f64>> {
+        let bends = self.bends(branch);
+        let place = self.place_along(&bends, share)?;
+        let [below, above] =
+            [bends[place.piece], bends[place.piece + 1]].map(|j| self.joints[j].at);
+        Some(below + place.share * (above - below))
+    }
+
+    /// The joints of a branch, from where it begins to its end.
+    fn bends(&self, branch: usize) -> Vec<usize> {
+        let Branch { begin, end, .. } = self.branches[branch];
+        let mut bends = vec![end];
+        let mut at = end;
+        while at != begin
+            && let Some(parent) = self.joints[at].parent
+        {
+            at = parent;
+            bends.push(at);
+        }
+        bends.reverse();
+        bends
+    }
+
+    fn place_along(&self, bends: &[usize], share: f64) -> Option<PlaceAlong> {
+        let length = |pair: &[usize]| (self.joints[pair[1]].at - self.joints[pair[0]].at).norm();
+        let whole: f64 = bends.windows(2).map(length).sum();
+        let mut left = share.clamp(0.0, 1.0) * whole;
+        for (piece, pair) in bends.windows(2).enumerate() {
+            let own = length(pair);
+            if left <= own || piece + 2 == bends.len() {
+                return Some(PlaceAlong {
+                    piece,
+                    share: (left / own.max(1e-9)).clamp(0.0, 1.0),
+                    same: SAME_JOINT * whole / own.max(1e-9),
+                });
+            }
+            left -= own;
+        }
+        None
+    }
+
+    /// The joint at a share of a branch's length, a new one where none is near.
+    fn joint_at(&mut self, branch: usize, share: f64) -> usize {
+        let bends = self.bends(branch);
+        let Some(place) = self.place_along(&bends, share) else {
+            return self.branches[branch].end;
+        };
+        let (below, above) = (bends[place.piece], bends[place.piece + 1]);
+        if place.share >= 1.0 - place.same {
+            return above;
+        }
+        if place.share <= place.same && place.piece > 0 {
+            return below;
+        }
+        let [from, to] = [&self.joints[below], &self.joints[above]];
+        let new = Joint {
+            parent: Some(below),
+            at: from.at + place.share * (to.at - from.at),
+            radius: from.radius + place.share * (to.radius - from.radius),
+            branch: to.branch,
+            own: None,
+        };
+        self.joints.push(new);
+        let joint = self.joints.len() - 1;
+        self.joints[above].parent = Some(joint);
+        joint
+    }
+
+    fn add(&mut self, grown: &Candidate) {
+        let generation = self.branches[grown.branch].generation + 1;
+        let mut branch_of: Vec<usize> = Vec::with_capacity(grown.shoots.len());
+        for shoot in &grown.shoots {
+            let carrier = shoot.on.map_or(grown.branch, |on| branch_of[on]);
+            let begin = self.joint_at(carrier, shoot.at);
+            let branch = self.branches.len();
+            let radius = (shoot.radius_share * self.joints[begin].radius).max(self.region.tip_px);
+            self.joints.push(Joint {
+                parent: Some(begin),
+                at: shoot.to,
+                radius: radius.min(self.joints[begin].radius),
+                branch,
+                own: None,
+            });
+            self.branches.push(Branch {
+                begin,
+                end: self.joints.len() - 1,
+                generation: generation + u32::from(shoot.on.is_some()),
+                is_grown: true,
+            });
+            branch_of.push(branch);
+        }
+        self.take(samples_of(&grown.shoots));
+        for shoot in &grown.shoots {
+            self.attract_quarter_turned(shoot.to);
+        }
+    }
+
+    /// The tree: what is from the picture first, each joint after its parent.
+    fn skeleton(&self) -> Skeleton {
+        let mut order: Vec<usize> = Vec::with_capacity(self.joints.len());
+        let mut place: Vec<Option<usize>> = vec![None; self.joints.len()];
+        for is_grown in [false, true] {
+            for joint in 0..self.joints.len() {
+                if self
+                    .branches
+                    .get(self.joints[joint].branch)
+                    .is_some_and(|b| b.is_grown)
+                    != is_grown
+                {
+                    continue;
+                }
+                // What is not placed yet of the way down, the lowest first.
+                let mut way = Vec::new();
+                let mut at = Some(joint).filter(|j| place[*j].is_none());
+                while let Some(next) = at {
+                    way.push(next);
+                    at = self.joints[next].parent.filter(|p| place[*p].is_none());
+                }
+                for next in way.into_iter().rev() {
+                    place[next] = Some(order.len());
+                    order.push(next);
+                }
+            }
+        }
+        let placed = |joint: usize| NodeId(place[joint].unwrap_or(0) as u32);
+        let names = self.tree.nodes.iter().map(|n| n.name.0).max();
+        let mut next_name = names.map_or(0, |n| n.saturating_add(1));
+        let mut levels: Vec<u8> = vec![0; self.branches.len()];
+        for (b, branch) in self.branches.iter().enumerate() {
+            let of_end = self.joints[branch.end].own.as_ref().map(|own| own.level);
+            let carrier = levels[self.joints[branch.begin].branch.min(b)];
+            levels[b] = of_end.unwrap_or(carrier.saturating_add(1));
+        }
+        let mut nodes = Vec::with_capacity(order.len());
+        for joint in order {
+            let own = &self.joints[joint];
+            let branch = self.branches.get(own.branch);
+            let is_end = branch.is_none_or(|b| b.end == joint) || own.parent.is_none();
+            let mover = branch.filter(|_| !is_end).map(|b| placed(b.end));
+            let mut node = own.own.clone().unwrap_or_else(|| {
+                next_name = next_name.saturating_add(1);
+                Node {
+                    name: NodeName(next_name - 1),
+                    parent: None,
+                    level: levels[own.branch],
+                    position: own.at,
+                    radius: own.radius,
+                    n_tracks: 0,
+                    kind: match branch.is_some_and(|b| b.is_grown) {
+                        true => NodeKind::Grown,
+                        false => NodeKind::Traced,
+                    },
+                    certainty: 0.0,
+                    copy_of: None,
+                    plane_angle: 0.0,
+                    moves_with: None,
+                }
+            });
+            node.parent = own.parent.map(placed);
+            node.moves_with = mover;
+            nodes.push(node);
+        }
+        Skeleton {
+            nodes,
+            ..self.tree.clone()
+        }
+    }
+}
+
+/// A place on a piece of a branch.
+struct PlaceAlong {
+    piece: usize,
+    /// 0 at its lower joint, 1 at its upper one.
+    share: f64,
+    /// What is nearer to a joint than this share of the piece is that joint.
+    same: f64,
+}
+
+fn sample(from: Point3<f64>, to: Point3<f64>, into: &mut Vec<Point3<f64>>) {
+    let shares = (1..=SAMPLES).map(|k| f64::from(k) / f64::from(SAMPLES));
+    into.extend(shares.map(|share| from + share * (to - from)));
+}
+
+fn samples_of(shoots: &[Shoot]) -> Vec<Point3<f64>> {
+    let mut samples = Vec::with_capacity(SAMPLES as usize * shoots.len());
+    for shoot in shoots {
+        sample(shoot.from, shoot.to, &mut samples);
+    }
+    samples
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grow::SubtreeKind;
+    use crate::model::Size;
+    use crate::random::generator;
+
+    /// A crown of 220 px about the fork of the tree; its foot is at (320, 300).
+    fn crown() -> Outline {
+        let size = Size::new(640, 360);
+        let mut mask = vec![0; size.area()];
+        for (i, m) in mask.iter_mut().enumerate() {
+            let (u, v) = ((i % 640) as f64, (i / 640) as f64);
+            *m = if (u - 320.0).hypot(v - 150.0) < 110.0 {
+                255
+            } else {
+                0
+            };
+        }
+        Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        }
+    }
+
+    fn grown(in_space: bool, rounds: usize) -> (Skeleton, Growth) {
+        let crown = crown();
+        let room =
+            |_: &Point3<f64>, to: &Point3<f64>| (to - Point3::new(0.0, 150.0, 0.0)).norm() < 112.0;
+        let region = GrowthRegion {
+            tree: &crown,
+            room: &room,
+            in_space,
+            tip_px: 0.3,
+        };
+        let mut tree = Skeleton::forked();
+        let library = Library::predefined(SubtreeKind::Both);
+        let random = &mut generator(5, 0);
+        let growth = grow_subtrees(&mut tree, &library, &region, rounds, random);
+        (tree, growth)
+    }
+
+    fn depth(tree: &Skeleton) -> f64 {
+        let squares = tree.nodes.iter().map(|n| n.position.z.powi(2));
+        (squares.sum::<f64>() / tree.nodes.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn a_crown_is_filled_and_kept_to() {
+        let (tree, growth) = grown(true, ROUNDS);
+        assert!(growth.branches > 40, "{growth:?}");
+        assert!(growth.after_px < 0.3 * growth.before_px, "{growth:?}");
+        let mut names: Vec<u32> = tree.nodes.iter().map(|n| n.name.0).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), tree.nodes.len());
+        let crown = crown();
+        for (i, node) in tree.nodes.iter().enumerate().skip(1) {
+            assert!(node.parent.is_some_and(|p| p.index() < i), "{node:?}");
+            if node.kind == NodeKind::Grown {
+                let at = tree.image_from_model(&node.position);
+                assert!(crown.contains(at.x, at.y), "{at}");
+            }
+            assert!(tree.moving_parent(NodeId(i as u32)).is_some(), "{node:?}");
+        }
+        // What the picture shows stays where it is.
+        for own in &Skeleton::forked().nodes {
+            let kept = tree.nodes.iter().find(|n| n.name == own.name);
+            let kept = kept.expect("it is there");
+            assert_eq!((kept.position, kept.kind), (own.position, own.kind));
+        }
+        let branches = tree.moving_branches().len();
+        assert_eq!(branches, growth.branches + 3);
+    }
+
+    /// Tan et al. 2008 fig. 6.
+    #[test]
+    fn attractors_in_space_make_the_tree_as_full_from_the_side() {
+        let [flat, full] = [false, true].map(|in_space| depth(&grown(in_space, 40).0));
+        assert!(full > 1.3 * flat, "{full} {flat}");
+    }
+
+    #[test]
+    fn the_same_seed_grows_the_same_tree() {
+        assert_eq!(grown(true, 20), grown(true, 20));
+        let (tree, growth) = grown(true, 0);
+        assert_eq!((tree, growth.branches), (Skeleton::forked(), 0));
+    }
+}

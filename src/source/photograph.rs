@@ -1,0 +1,171 @@
+//! One photograph: PNG, JPEG or BMP, turned upright, and reduced where it is large.
+
+use crate::model::{Rgb, Size};
+use image::imageops::FilterType;
+use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use std::io::Cursor;
+
+/// Pixels of a photograph that are read, at most.
+const MOST_PIXELS: u64 = 64_000_000;
+/// Longest side on which a photograph is worked, px; larger ones are reduced to it. The paper's have
+/// about 1500 (Tan et al. 2008 sect. 2.2).
+pub const LONGEST_SIDE_PX: u32 = 1536;
+/// Least side, px.
+const LEAST_SIDE_PX: u32 = 64;
+
+/// A photograph as it is worked on.
+#[derive(Clone, Debug)]
+pub struct Photograph {
+    pub picture: Rgb,
+    /// As it is seen, before it was reduced.
+    pub full_size: Size,
+}
+
+/// Why a file gives no photograph. Each message is one line that says what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotographError {
+    #[error("it is no picture that can be read ({what}); give a PNG or JPEG file")]
+    BadFormat { what: String },
+    #[error("it has {megapixels} megapixels, and at most 64 are read; reduce it")]
+    TooLarge { megapixels: u64 },
+    #[error("it is {size} px, and must have 64 px a side at least; give a larger one")]
+    TooSmall { size: Size },
+}
+
+impl Photograph {
+    /// Reads the bytes of a picture file. Its EXIF orientation is applied; 16 bits a channel become
+    /// 8, grey and CMYK become colours, and transparent parts lose their transparency.
+    ///
+    /// # Errors
+    /// It is damaged, of another format, too large or too small.
+    pub fn read(bytes: &[u8]) -> Result<Self, PhotographError> {
+        let mut reader = ImageReader::new(Cursor::new(bytes))
+            .with_guessed_format()
+            .map_err(bad_format)?;
+        reader.limits(Limits::no_limits());
+        let mut decoder = reader.into_decoder().map_err(bad_format)?;
+        let (width, height) = decoder.dimensions();
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > MOST_PIXELS {
+            return Err(PhotographError::TooLarge {
+                megapixels: pixels.div_ceil(1_000_000),
+            });
+        }
+        let size = Size::new(width, height);
+        if width.min(height) < LEAST_SIDE_PX {
+            return Err(PhotographError::TooSmall { size });
+        }
+        let orientation = decoder.orientation().map_err(bad_format)?;
+        let mut image = DynamicImage::from_decoder(decoder).map_err(bad_format)?;
+        let longest = width.max(height);
+        if longest > LONGEST_SIDE_PX {
+            image = image.resize(LONGEST_SIDE_PX, LONGEST_SIDE_PX, FilterType::Triangle);
+        }
+        image.apply_orientation(orientation);
+        let rgb = image.into_rgb8();
+        let is_turned = (rgb.width() > rgb.height()) != (width > height);
+        let full_size = match is_turned {
+            true => Size::new(height, width),
+            false => size,
+        };
+        Ok(Self {
+            full_size,
+            picture: Rgb {
+                size: Size::new(rgb.width(), rgb.height()),
+                pixels: rgb.into_raw(),
+            },
+        })
+    }
+}
+
+fn bad_format(e: impl std::fmt::Display) -> PhotographError {
+    PhotographError::BadFormat {
+        what: e.to_string().replace('\n', " "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ExtendedColorType, ImageEncoder, Rgb as Pixel, RgbImage};
+
+    fn png(image: &DynamicImage) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image
+            .write_to(&mut bytes, image::ImageFormat::Png)
+            .expect("png");
+        bytes.into_inner()
+    }
+
+    /// Red above, blue below.
+    fn halves(width: u32, height: u32) -> RgbImage {
+        RgbImage::from_fn(width, height, |_, v| {
+            Pixel(if v < height / 2 {
+                [200, 0, 0]
+            } else {
+                [0, 0, 200]
+            })
+        })
+    }
+
+    #[test]
+    fn a_large_photograph_is_reduced_and_a_small_one_stays() {
+        let read = |w, h| Photograph::read(&png(&halves(w, h).into())).expect("a photograph");
+        let small = read(640, 400);
+        assert_eq!(small.picture.size, Size::new(640, 400));
+        let large = read(3072, 2000);
+        assert_eq!(large.full_size, Size::new(3072, 2000));
+        assert_eq!(large.picture.size, Size::new(1536, 1000));
+        assert_eq!(large.picture.at(700, 100), [200, 0, 0]);
+        assert_eq!(large.picture.at(700, 900), [0, 0, 200]);
+    }
+
+    #[test]
+    fn sixteen_bits_and_grey_are_read() {
+        let wide = DynamicImage::from(halves(80, 70)).into_rgb16();
+        let read = Photograph::read(&png(&wide.into())).expect("a photograph");
+        assert_eq!(read.picture.at(3, 3), [200, 0, 0]);
+        let grey = DynamicImage::from(halves(80, 70)).into_luma8();
+        let read = Photograph::read(&png(&grey.into())).expect("a photograph");
+        assert_eq!(read.picture.pixels.len(), 3 * 80 * 70);
+    }
+
+    /// Orientation 6: the camera was turned to the left, and the picture is turned to the right.
+    #[test]
+    fn a_photograph_is_turned_upright() {
+        let mut bytes = Vec::new();
+        let mut encoder = image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, 95);
+        let exif = [
+            &b"MM\0\x2a\0\0\0\x08\0\x01"[..],
+            &b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0"[..],
+            &[0; 4],
+        ];
+        encoder.set_exif_metadata(exif.concat()).expect("exif");
+        let lying = halves(120, 80);
+        encoder
+            .write_image(lying.as_raw(), 120, 80, ExtendedColorType::Rgb8)
+            .expect("jpeg");
+        let read = Photograph::read(&bytes).expect("a photograph");
+        assert_eq!(read.picture.size, Size::new(80, 120));
+        assert_eq!(read.full_size, Size::new(80, 120));
+        // What was above is on the right.
+        assert!(read.picture.at(70, 60)[0] > 150 && read.picture.at(10, 60)[2] > 150);
+    }
+
+    #[test]
+    fn what_is_no_photograph_is_refused_in_one_line() {
+        let whole = png(&halves(200, 100).into());
+        for (bytes, expected) in [
+            (b"no picture".to_vec(), "no picture"),
+            (whole[..whole.len() / 2].to_vec(), "no picture"),
+            (png(&halves(30, 100).into()), "64 px a side"),
+            (
+                png(&DynamicImage::new_luma8(10_000, 10_000)),
+                "100 megapixels",
+            ),
+        ] {
+            let error = Photograph::read(&bytes).expect_err(expected).to_string();
+            assert!(error.contains(expected) && !error.contains('\n'), "{error}");
+        }
+    }
+}

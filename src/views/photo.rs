@@ -1,0 +1,186 @@
+//! Documents of trees in one photograph (Tan et al. 2008).
+
+use super::drawn::DrawnTree;
+use super::{Draft, PrepareError, write_document};
+use crate::config::{Config, LeafShow};
+use crate::document::Document;
+use crate::document::note::{BarkNote, MasksNote, ModelNote, PictureNote};
+use crate::document::{BARK_FILE, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE, WOOD_MASK_FILE};
+use crate::grow::{Growth, GrowthRegion, Library, ROUNDS, SubtreeKind, grow_subtrees, sample_sway};
+use crate::import::FlatTree;
+use crate::model::{Outline, Picture, Rgb, Skeleton, Swaying, Wood};
+use crate::random::generator;
+use crate::shape::{self, Silhouette};
+use crate::signal::distance_to_segment;
+use nalgebra::Point2;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Triangles of all leaves: a photograph shows single ones. With the 20,000 of a film the silhouette of
+/// made photographs is met by 0.76 instead of 0.80.
+const LEAF_TRIANGLES: u32 = 100_000;
+/// A node is on the trunk's line no farther from it than this, px.
+const ON_LINE_PX: f64 = 1.0;
+
+/// The settings that trees of photographs have if no others are given.
+pub fn photo_defaults() -> Config {
+    let mut config = Config::default();
+    // What is behind is grown, not copied.
+    config.shape.planes = 1;
+    config.leaves.triangles = LEAF_TRIANGLES;
+    config
+}
+
+/// What a photograph shows of a tree.
+#[derive(Clone, Copy, Debug)]
+pub struct PhotoParts<'a> {
+    pub picture: &'a Arc<Rgb>,
+    /// The visible branches.
+    pub flat: &'a FlatTree,
+    /// Where the tree is, in one piece.
+    pub region: &'a Outline,
+    pub in_leaf: bool,
+    pub wood: &'a Wood,
+}
+
+/// How a tree of a photograph goes on where it is not seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PhotoGrowth<'a> {
+    /// Which ready-made subtrees are used where too few branches are seen.
+    pub subtrees: SubtreeKind,
+    /// A tree whose subtrees are used instead, and whose sway is that of the new tree by chance.
+    pub like: Option<&'a Document>,
+    /// How the visible branches come into space.
+    pub depth: PhotoDepth,
+}
+
+/// How branches that are seen in one picture come into space.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PhotoDepth {
+    /// They are pushed to fill the crown turned about its axis, with likely angles (Li 2011 sect. 3).
+    #[default]
+    Push,
+    /// They lie as far apart as they can (Okabe et al. 2005).
+    Apart,
+}
+
+/// The tree of a photograph in space.
+pub struct PhotoTree {
+    pub tree: DrawnTree,
+    /// What was grown; nothing of a bare tree, whose branches are all seen.
+    pub growth: Growth,
+    sway: Vec<Swaying>,
+    picture: Picture,
+    wood: Wood,
+}
+
+impl PhotoTree {
+    /// Stands the visible branches up in space and, of a tree in leaf, grows those that leaves hide.
+    /// `name` says where the photograph is from. A bare tree gets neither leaves nor twigs but those
+    /// that are seen.
+    ///
+    /// # Errors
+    /// It has too many branches.
+    pub fn new(
+        name: String,
+        parts: PhotoParts,
+        growth: PhotoGrowth,
+        mut config: Config,
+    ) -> Result<Self, PrepareError> {
+        config.leaves.show = match (config.leaves.show, parts.in_leaf) {
+            (LeafShow::Auto, true) => LeafShow::On,
+            (LeafShow::Auto, false) => LeafShow::Off,
+            (wished, _) => wished,
+        };
+        if !parts.in_leaf {
+            config.wood.twig_px = 0.0;
+        }
+        let mut tree = DrawnTree::new(name, parts.flat, parts.region, config)?;
+        if growth.depth == PhotoDepth::Apart {
+            let trunk = on_line(&tree.skeleton, &parts.flat.trunk_px);
+            shape::set_depths_apart(&mut tree.skeleton, &trunk);
+        }
+        let seed = tree.note.config.wood.seed.into();
+        let mut grown = Growth::default();
+        if parts.in_leaf {
+            grown = grow(&mut tree, parts.region, growth, seed);
+            tree.note.model = Some(ModelNote::of(
+                &tree.skeleton,
+                tree.note.config.export.metres_per_px,
+            ));
+        }
+        let sway = growth.like.map_or(Vec::new(), |like| {
+            let random = &mut generator(seed, 1);
+            sample_sway(&like.skeleton, &like.sway, &tree.skeleton, random)
+        });
+        let note = &mut tree.note;
+        note.picture = Some(PictureNote {
+            file: PICTURE_FILE.into(),
+            ..PictureNote::default()
+        });
+        note.bark = parts.wood.bark.as_ref().map(|_| BarkNote {
+            file: BARK_FILE.into(),
+        });
+        note.masks = parts.wood.at_rest.as_ref().map(|_| MasksNote {
+            wood: WOOD_MASK_FILE.into(),
+            leaves: LEAVES_MASK_FILE.into(),
+            rest: REST_FILE.into(),
+        });
+        Ok(Self {
+            tree,
+            growth: grown,
+            sway,
+            picture: Picture {
+                rgb: parts.picture.clone(),
+                frame: 0,
+                time_s: 0.0,
+            },
+            wood: parts.wood.clone(),
+        })
+    }
+
+    /// Writes it as a document to `dir`, which appears when it is complete.
+    ///
+    /// # Errors
+    /// `dir` is there already, or a file cannot be written.
+    pub fn write(self, dir: &Path) -> Result<PathBuf, PrepareError> {
+        let draft = Draft {
+            note: self.tree.note,
+            skeleton: &self.tree.skeleton,
+            picture: Some(&self.picture),
+            bark: self.wood.bark.as_ref(),
+            at_rest: self.wood.at_rest.as_ref(),
+            poses: Vec::new(),
+            pose_in_picture: None,
+        };
+        write_document(dir, draft, &self.sway)
+    }
+}
+
+/// Grows the branches that are not seen.
+fn grow(tree: &mut DrawnTree, region: &Outline, growth: PhotoGrowth, seed: u64) -> Growth {
+    let example = growth.like.map_or(&tree.skeleton, |like| &like.skeleton);
+    let library = Library::of(example, growth.subtrees);
+    let silhouette = Silhouette::Filmed(tree.note.config.shape.envelope);
+    let room = shape::room(&tree.skeleton, Some(region), silhouette);
+    let width_px = f64::from(tree.skeleton.image_size.width);
+    let region = GrowthRegion {
+        tree: region,
+        room: &room,
+        in_space: true,
+        tip_px: shape::TIP_RADIUS_PX * width_px / 640.0,
+    };
+    let random = &mut generator(seed, 0);
+    grow_subtrees(&mut tree.skeleton, &library, &region, ROUNDS, random)
+}
+
+/// Whether each node lies on a line in the picture (px).
+fn on_line(skeleton: &Skeleton, line_px: &[Point2<f64>]) -> Vec<bool> {
+    let mut on = Vec::with_capacity(skeleton.nodes.len());
+    for node in &skeleton.nodes {
+        let at = skeleton.image_from_model(&node.position);
+        let mut pieces = line_px.windows(2);
+        on.push(pieces.any(|ends| distance_to_segment(at, ends[0], ends[1]) < ON_LINE_PX));
+    }
+    on
+}

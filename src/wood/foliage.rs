@@ -1,0 +1,208 @@
+//! Which pixels of a photograph are leaves: the colours within a crown stroke as a mixture of ten
+//! normal distributions, of which some are the leaves', and a graph cut (Tan et al. 2008 sect. 2.1).
+//!
+//! The paper takes the four most green or red parts as leaves. Here it is the greener of two groups
+//! of parts (Otsu): on made photographs leaves have five or six of the ten, and the mask's
+//! intersection over union with the truth is 0.89 to 0.94 instead of 0.74 to 0.92. The data term
+//! is that of the paper with leaf and background exchanged, as they are in print.
+
+use super::cut::{PAIRS, least_cut, neighbour};
+use super::mixture::{Mixture, Normal};
+use crate::cancel::CancelToken;
+use crate::model::Rgb;
+use crate::random::generator;
+use crate::signal::statistics::otsu;
+use nalgebra::Vector3;
+
+/// Parts of the mixture (Tan et al. 2008 sect. 2.1).
+const PARTS: usize = 10;
+/// Weight of the smooth term (lambda of Tan et al. 2008 sect. 2.1), and the least difference of
+/// neighbours in it, grey levels: the paper's term has no bound.
+const SMOOTH: f64 = 60.0;
+const LEAST_DIFFERENCE: f64 = 1.0;
+/// Colours that a mixture is learned from, at most.
+const MOST_COLOURS: usize = 12_000;
+/// Light that is added to a part's before its share of a colour is taken: dark parts count as grey.
+const DARK: f64 = 30.0;
+/// No leaf has less of its colour than this, see [`LeafColour::score`].
+const LEAST_SCORE: f64 = 0.125;
+/// A crown is in leaf where leaves have so great a share of it.
+const IN_LEAF: f64 = 0.15;
+
+/// The colour by which leaves are known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LeafColour {
+    #[default]
+    Green,
+    /// In autumn, and of copper beeches.
+    Red,
+    Yellow,
+    /// Blossom.
+    White,
+}
+
+impl LeafColour {
+    /// How much a colour (red, green, blue; 0 to 255) is of this one: above 0 by its share of the
+    /// light, 1 at most.
+    fn score(self, colour: &Vector3<f64>) -> f64 {
+        let [red, green, blue] = [colour.x, colour.y, colour.z];
+        let light = red + green + blue + DARK;
+        match self {
+            Self::Green => (2.0 * green - red - blue) / light,
+            Self::Red => (2.0 * red - green - blue) / light,
+            Self::Yellow => (red.min(green) - blue) / light,
+            Self::White => {
+                let [most, least] = [red.max(green).max(blue), red.min(green).min(blue)];
+                least / 255.0 - 2.0 * (most - least) / light
+            }
+        }
+    }
+}
+
+/// Which pixels are leaves, 255 or 0, row by row, within `region` (one byte a pixel, 0 outside);
+/// none where the crown has too little of this `colour`. `None` where `cancel` ends the work.
+pub fn foliage(
+    picture: &Rgb,
+    region: &[u8],
+    colour: LeafColour,
+    cancel: &CancelToken,
+) -> Option<Vec<u8>> {
+    let bare = vec![0; picture.size.area()];
+    let colours = sampled(picture, |i| region[i] != 0);
+    let mixture = Mixture::learned(&colours, PARTS, &mut generator(0, 0));
+    let Some(clusters) = Clusters::of(&mixture, colour) else {
+        return Some(bare);
+    };
+    let mut odds = vec![0.0; picture.size.area()];
+    for (i, odds) in odds.iter_mut().enumerate().filter(|(i, _)| region[*i] != 0) {
+        let colour = pixel(picture, i);
+        let ratio = clusters.leaves.density(&colour) / clusters.others.density(&colour);
+        *odds = ratio.ln() as f32;
+    }
+    let links = links(picture, region);
+    let is_leaf = least_cut(picture.size, &odds, &links, cancel)?;
+    let mut mask = bare;
+    for (i, is_leaf) in is_leaf.into_iter().enumerate() {
+        mask[i] = if is_leaf && region[i] != 0 { 255 } else { 0 };
+    }
+    Some(mask)
+}
+
+/// The parts of a mixture that are leaves, and the others.
+struct Clusters {
+    leaves: Mixture,
+    others: Mixture,
+}
+
+impl Clusters {
+    /// `None` where too little is of the colour of leaves, or nothing is of another.
+    fn of(mixture: &Mixture, colour: LeafColour) -> Option<Self> {
+        let mut histogram = [0; 256];
+        for part in &mixture.parts {
+            histogram[level(colour.score(&part.mean))] += (1000.0 * part.share) as u32;
+        }
+        let least = f64::from(otsu(&histogram)).max(level(LEAST_SCORE) as f64);
+        let is_leaf = |part: &Normal| level(colour.score(&part.mean)) as f64 > least;
+        let (leaves, others): (Vec<Normal>, Vec<Normal>) =
+            mixture.parts.iter().cloned().partition(is_leaf);
+        let share: f64 = leaves.iter().map(|part| part.share).sum();
+        (share >= IN_LEAF && !others.is_empty()).then(|| Self {
+            leaves: Mixture::of_parts(&leaves),
+            others: Mixture::of_parts(&others),
+        })
+    }
+}
+
+/// A score as one of 256 levels, for a histogram.
+fn level(score: f64) -> usize {
+    (100.0 + 200.0 * score).clamp(0.0, 255.0) as usize
+}
+
+/// Colours (red, green, blue) of the pixels that `is_wanted` holds for, evenly spread over them: as
+/// many as a mixture is learned from.
+pub(super) fn sampled(picture: &Rgb, is_wanted: impl Fn(usize) -> bool) -> Vec<Vector3<f64>> {
+    let wanted: Vec<usize> = (0..picture.size.area()).filter(|i| is_wanted(*i)).collect();
+    let count = wanted.len().min(MOST_COLOURS);
+    let places = (0..count).map(|k| wanted[k * wanted.len() / count]);
+    places.map(|i| pixel(picture, i)).collect()
+}
+
+/// The colour of a pixel, red first, 0 to 255.
+pub(super) fn pixel(picture: &Rgb, i: usize) -> Vector3<f64> {
+    Vector3::from_fn(|channel, _| f64::from(picture.pixels[3 * i + channel]))
+}
+
+/// What it costs that neighbours differ: lambda by the difference of their colours (Tan et al. 2008
+/// sect. 2.1), between the four neighbours of a pixel.
+fn links(picture: &Rgb, region: &[u8]) -> Vec<[f32; PAIRS]> {
+    let mut links = vec![[0.0; PAIRS]; region.len()];
+    for (i, links) in links
+        .iter_mut()
+        .enumerate()
+        .filter(|(i, _)| region[*i] != 0)
+    {
+        // Every second of the directions is a diagonal.
+        for pair in (0..PAIRS).step_by(2) {
+            if let Some(next) = neighbour(i, pair, picture.size).filter(|n| region[*n] != 0) {
+                let apart = (pixel(picture, i) - pixel(picture, next)).norm();
+                links[pair] = (SMOOTH / apart.max(LEAST_DIFFERENCE)) as f32;
+            }
+        }
+    }
+    links
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Size;
+    use crate::random::seed_of_part;
+
+    /// Leaves of `leaf` in the left half, sky of many lights elsewhere.
+    fn halves(leaf: [i64; 3]) -> Rgb {
+        let size = Size::new(80, 60);
+        let mut pixels = Vec::new();
+        for i in 0..size.area() {
+            let noise = (seed_of_part(4, i as u64) % 40) as i64 - 20;
+            let colour = if i % 80 < 40 { leaf } else { [150, 170, 200] };
+            pixels.extend(colour.map(|c| (c + noise).clamp(0, 255) as u8));
+        }
+        Rgb { size, pixels }
+    }
+
+    fn found(leaf: [i64; 3], colour: LeafColour) -> [usize; 2] {
+        let picture = halves(leaf);
+        let mask = foliage(&picture, &[255; 80 * 60], colour, &CancelToken::new()).expect("a cut");
+        let count = |is_left: bool| {
+            let pixels = (0..mask.len()).filter(|i| (i % 80 < 40) == is_left);
+            pixels.filter(|i| mask[*i] != 0).count()
+        };
+        [count(true), count(false)]
+    }
+
+    #[test]
+    fn leaves_are_found_by_the_colour_that_they_are_said_to_have() {
+        for (leaf, colour) in [
+            ([60, 120, 40], LeafColour::Green),
+            ([150, 50, 40], LeafColour::Red),
+            ([180, 160, 40], LeafColour::Yellow),
+            ([235, 230, 232], LeafColour::White),
+        ] {
+            let [leaves, sky] = found(leaf, colour);
+            assert!(leaves > 2300 && sky < 60, "{colour:?}: {leaves} {sky}");
+        }
+    }
+
+    #[test]
+    fn a_crown_without_the_colour_of_leaves_is_bare() {
+        assert_eq!(found([90, 80, 70], LeafColour::Green), [0, 0]);
+        assert_eq!(found([60, 120, 40], LeafColour::Red), [0, 0]);
+        let nothing = foliage(
+            &halves([60, 120, 40]),
+            &[0; 80 * 60],
+            LeafColour::Green,
+            &CancelToken::new(),
+        );
+        assert!(nothing.is_some_and(|mask| mask.iter().all(|m| *m == 0)));
+    }
+}

@@ -1,0 +1,385 @@
+//! The wood and the leaves of a tree in one photograph (Tan et al. 2008 sect. 2): strokes are in the
+//! place of a film's motion.
+//!
+//! As in the paper the colours on the strokes, leaves left out, and those of all else are two
+//! mixtures of five normal distributions. Branches are traced in a mask of the pixels that are more
+//! likely wood, as those of films are; the paper moves a circle over the same pixels, which is the
+//! other choice (`skeleton.trace_by`).
+
+use super::cut::{SURE, least_cut};
+use super::foliage::{LeafColour, foliage, pixel, sampled};
+use super::mask::{self, Part, Parts, WoodMask};
+use super::mixture::Mixture;
+use super::{Stroke, bark, circles, faint, paths, probability, widened};
+use crate::cancel::CancelToken;
+use crate::config::TraceBy;
+use crate::model::{AtRest, BranchGraph, Luma, Masks, Outline, Rgb, Size, Wood};
+use crate::random::generator;
+use crate::signal::convex_hull;
+use nalgebra::{Point2, Vector3};
+use opencv::core::{Mat, Point, Scalar, Vec3b, Vector};
+use opencv::imgproc::{LINE_8, fill_convex_poly, polylines};
+use opencv::prelude::*;
+use std::sync::Arc;
+
+/// The crown stroke is widened by so much, px (Tan et al. 2008 sect. 2.1: ten times by a pixel).
+const FREEDOM_PX: f64 = 10.0;
+/// Branches are looked for so far beside a branch stroke beyond the crown, as a share of the
+/// picture's width (the radius of the circles of Tan et al. 2008 sect. 2.2, 50 px of 1500).
+const BESIDE_STROKE: f64 = 1.0 / 30.0;
+/// Parts of the mixtures of wood and of all else (Tan et al. 2008 sect. 2.2).
+const PARTS: usize = 5;
+/// Fewer colours than this on the strokes show no bark.
+const LEAST_BARK: usize = 64;
+/// The colours on the strokes are bark if their odds against all else are this at least in their mean, as
+/// a logarithm; elsewhere there is nothing to see.
+const LEAST_TOLD: f64 = 0.5;
+/// No colour counts more than this: mixtures are sure of what they have not seen.
+const COLOUR_ODDS: f32 = 4.0;
+/// What is added to the odds of a bare tree's pixel on a ridge, and elsewhere; to those of a tree
+/// in leaf; and of its leaves. By the truth of ten made photographs.
+const RIDGE_ODDS: f32 = 1.6;
+const PLAIN_ODDS: f32 = -2.4;
+const LEAFY_ODDS: f32 = -1.0;
+const LEAF_ODDS: f32 = -4.0;
+/// Leaves nearer to each other than twice this share of the picture's width are one piece, and pieces
+/// with less than this share of the area of all are none of the tree's.
+const CLUMP_SHARE: f64 = 0.006;
+const SMALL_PIECE: f64 = 0.03;
+/// Where so great a share of a piece of a branch is leaves, its width is not seen.
+const HIDDEN: f64 = 0.5;
+
+/// A photograph and what was drawn on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Photograph<'a> {
+    pub picture: &'a Rgb,
+    /// Within the crown stroke.
+    pub crown: &'a Outline,
+    /// Lines along branches, px, the trunk's first, from its foot up; one at least.
+    pub strokes: &'a [Stroke],
+    pub leaf_colour: LeafColour,
+    pub trace_by: TraceBy,
+}
+
+/// What a photograph shows of a tree.
+#[derive(Clone, Debug)]
+pub struct SeenInPhotograph {
+    /// The visible branches, with radius 0 where it is not seen, and the masks of wood and leaves.
+    pub wood: Wood,
+    pub in_leaf: bool,
+    /// Where leaves or wood are, 255 or 0, row by row.
+    pub tree: Vec<u8>,
+}
+
+/// Finds the wood and the leaves. `None` where no wood is seen, and where `cancel` ends the work
+/// before.
+///
+/// # Errors
+/// OpenCV fails.
+pub fn in_photograph(
+    photo: Photograph,
+    cancel: &CancelToken,
+) -> opencv::Result<Option<SeenInPhotograph>> {
+    let size = photo.picture.size;
+    let Some(foot_px) = photo.strokes.first().and_then(|trunk| trunk.first()) else {
+        return Ok(None);
+    };
+    let crown = widened(photo.crown, FREEDOM_PX)?;
+    let Some(leaves) = foliage(photo.picture, &crown, photo.leaf_colour, cancel) else {
+        return Ok(None);
+    };
+    let leaves = without_far_pieces(leaves, size)?;
+    let region = with_strokes(photo.crown, &crown, photo.strokes)?;
+    let Some(mask) = wood_mask(photo, &region, &leaves, cancel)? else {
+        return Ok(None);
+    };
+    let traced = match photo.trace_by {
+        TraceBy::Paths => paths::branches(&mask, *foot_px)?,
+        TraceBy::Circles => circles::branches(&mask, *foot_px)?,
+    };
+    let mut branches = match mask.in_leaf {
+        true => traced,
+        false => faint::without_faint(traced, photo.picture),
+    };
+    if branches.nodes.len() < 2 {
+        return Ok(None);
+    }
+    hide_radii(&mut branches, &leaves, size);
+    let mut wood = probability::mask_of_wood(&mask, size);
+    let mut tree = leaves.clone();
+    for (i, leaf) in leaves.iter().enumerate() {
+        wood.pixels[i] = wood.pixels[i].min(255 - leaf);
+        tree[i] |= mask.mask[i];
+    }
+    let bark = bark::tile(photo.picture, &wood, &branches);
+    let leaves = Luma {
+        size,
+        pixels: leaves,
+    };
+    let at_rest = AtRest {
+        picture: photo.picture.clone(),
+        masks: Masks { wood, leaves },
+    };
+    Ok(Some(SeenInPhotograph {
+        wood: Wood {
+            branches,
+            bark: bark.map(Arc::new),
+            at_rest: Some(Arc::new(at_rest)),
+        },
+        in_leaf: mask.in_leaf,
+        tree,
+    }))
+}
+
+/// Leaves without the pieces of a lawn or a bush that lie within the crown stroke: those that are
+/// small and apart from the others.
+fn without_far_pieces(mut leaves: Vec<u8>, size: Size) -> opencv::Result<Vec<u8>> {
+    let closed = Outline {
+        size,
+        mask: leaves.clone(),
+        polygon_px: Vec::new(),
+        matte: None,
+    };
+    let joined = widened(&closed, CLUMP_SHARE * f64::from(size.width))?;
+    let n_joined = joined.iter().filter(|m| **m != 0).count();
+    let most = (SMALL_PIECE * n_joined as f64) as usize;
+    let is_small = Parts::of(&joined, size, 8)?.no_larger_than(most);
+    for (leaf, is_small) in leaves.iter_mut().zip(is_small) {
+        *leaf = if is_small { 0 } else { *leaf };
+    }
+    Ok(leaves)
+}
+
+/// The pixels within `region` that are more likely wood than not. `None` where the strokes show too
+/// little bark, and where `cancel` ends the work.
+fn wood_mask(
+    photo: Photograph,
+    region: &[u8],
+    leaves: &[u8],
+    cancel: &CancelToken,
+) -> opencv::Result<Option<WoodMask>> {
+    let size = photo.picture.size;
+    let in_leaf = leaves.iter().any(|leaf| *leaf != 0);
+    let mut out = WoodMask {
+        size,
+        scale: 1,
+        mask: vec![0; size.area()],
+        odds: vec![f32::NEG_INFINITY; size.area()],
+        moves: vec![false; size.area()],
+        is_leaf: leaves.iter().map(|leaf| *leaf != 0).collect(),
+        in_leaf,
+    };
+    let Some(bounds) = Part::holding(region, size) else {
+        return Ok(None);
+    };
+    let is_stroke = mask::drawn(photo.strokes, &out)?;
+    let bark_colours = sampled(photo.picture, |i| is_stroke[i] && leaves[i] == 0);
+    if bark_colours.len() < LEAST_BARK {
+        return Ok(None);
+    }
+    let others = sampled(photo.picture, |i| region[i] == 0 || leaves[i] != 0);
+    let bark = Mixture::learned(&bark_colours, PARTS, &mut generator(0, 1));
+    let others = Mixture::learned(&others, PARTS, &mut generator(0, 2));
+    let told: f64 = bark_colours
+        .iter()
+        .map(|c| ln_ratio(&bark, &others, c))
+        .sum();
+    if told < LEAST_TOLD * bark_colours.len() as f64 {
+        return Ok(None);
+    }
+    let bgr = mask::enlarged_picture(photo.picture, size)?;
+    let is_inside: Vec<bool> = region.iter().map(|m| *m != 0).collect();
+    let is_ridge = match in_leaf {
+        true => Vec::new(),
+        false => mask::ridges(&bgr, bounds, &is_inside, size)?,
+    };
+    let mut odds = vec![0.0; size.area()];
+    for i in (0..size.area()).filter(|i| is_inside[*i]) {
+        let colour = pixel(photo.picture, i);
+        let by_colour = ln_ratio(&bark, &others, &colour) as f32;
+        let by_place = match (is_ridge.get(i), out.is_leaf[i]) {
+            (Some(true), _) => RIDGE_ODDS,
+            (Some(false), _) => PLAIN_ODDS,
+            (None, false) => LEAFY_ODDS,
+            (None, true) => LEAF_ODDS,
+        };
+        odds[i] = by_colour.clamp(-COLOUR_ODDS, COLOUR_ODDS) + by_place;
+        if is_stroke[i] {
+            odds[i] = SURE;
+        }
+        out.odds[i] = odds[i];
+    }
+    let links = mask::links(bgr.data_typed::<Vec3b>()?, region, size);
+    let Some(is_wood) = least_cut(size, &odds, &links, cancel) else {
+        return Ok(None);
+    };
+    for i in (0..size.area()).filter(|i| is_inside[*i] && is_wood[*i]) {
+        out.mask[i] = 255;
+    }
+    if in_leaf {
+        let is_wide = mask::wide(&out.mask, size)?;
+        for (i, mask) in out.mask.iter_mut().enumerate() {
+            *mask = if is_wide[i] || is_stroke[i] { *mask } else { 0 };
+        }
+    }
+    mask::without_specks(&mut out.mask, size)?;
+    Ok(Some(out))
+}
+
+/// The odds that a colour is of the first mixture, as a logarithm.
+fn ln_ratio(first: &Mixture, second: &Mixture, colour: &Vector3<f64>) -> f64 {
+    (first.density(colour) / second.density(colour)).ln()
+}
+
+/// Sets the radius of pieces that leaves hide to 0: a stroke through leaves is a branch, and is no
+/// measure of its width.
+fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
+    let ends: Vec<Point2<f64>> = branches.nodes.iter().map(|n| n.position_px).collect();
+    for (node, to) in branches.nodes.iter_mut().zip(&ends) {
+        let Some(from) = node.parent.map(|p| ends[p]) else {
+            continue;
+        };
+        let steps = (to - from).norm().ceil().max(1.0) as usize;
+        let is_hidden = |step: &usize| {
+            let at = from + (to - from) * (*step as f64 / steps as f64);
+            let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
+            let place = v * size.width as usize + u;
+            leaves.get(place).is_some_and(|leaf| *leaf != 0)
+        };
+        let hidden = (1..=steps).filter(is_hidden).count();
+        if hidden as f64 > HIDDEN * steps as f64 {
+            node.radius_px = 0.0;
+        }
+    }
+}
+
+/// The `widened` region of a crown, what is beside the strokes, and what lies between: the convex hull of
+/// both, as limbs leave the trunk below the crown.
+fn with_strokes(crown: &Outline, widened: &[u8], strokes: &[Stroke]) -> opencv::Result<Vec<u8>> {
+    let size = crown.size;
+    let (rows, cols) = (size.height as i32, size.width as i32);
+    let mut mask = Mat::new_rows_cols_with_data(rows, cols, widened)?.try_clone()?;
+    let wide_px = (2.0 * BESIDE_STROKE * f64::from(size.width)).ceil() as i32;
+    let mut places: Vec<Point2<f64>> = strokes.iter().flatten().copied().collect();
+    places.extend(crown.polygon_px.iter().map(|corner| corner.map(f64::from)));
+    let hull: Vector<Point> = convex_hull(&places).iter().map(rounded).collect();
+    let white = Scalar::all(255.0);
+    if hull.len() > 2 {
+        fill_convex_poly(&mut mask, &hull, white, LINE_8, 0)?;
+    }
+    for stroke in strokes {
+        let corners: Vector<Point> = stroke.iter().map(rounded).collect();
+        polylines(&mut mask, &corners, false, white, wide_px, LINE_8, 0)?;
+    }
+    Ok(mask.data_bytes()?.to_vec())
+}
+
+fn rounded(at: &Point2<f64>) -> Point {
+    Point::new(at.x.round() as i32, at.y.round() as i32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::seed_of_part;
+    use crate::signal::distance_to_segment;
+
+    const SIZE: Size = Size {
+        width: 320,
+        height: 240,
+    };
+    const FOOT: Point2<f64> = Point2::new(160.0, 230.0);
+    const TOP: Point2<f64> = Point2::new(160.0, 130.0);
+
+    /// A dark trunk that forks, before a bright sky; the right limb runs behind leaves from its middle
+    /// on where the tree is in leaf.
+    fn picture(in_leaf: bool) -> Rgb {
+        let limbs = [
+            [FOOT, TOP],
+            [TOP, Point2::new(100.0, 30.0)],
+            [TOP, Point2::new(230.0, 40.0)],
+        ];
+        let mut pixels = Vec::new();
+        for i in 0..SIZE.area() {
+            let at = Point2::new((i % 320) as f64, (i / 320) as f64);
+            let is_wood = limbs
+                .iter()
+                .any(|[a, b]| distance_to_segment(at, *a, *b) <= 4.0);
+            let is_leaf = in_leaf && (at - Point2::new(225.0, 60.0)).norm() < 45.0;
+            let noise = (seed_of_part(8, i as u64) % 25) as i64;
+            let colour = match (is_leaf, is_wood) {
+                (true, _) => [50, 110, 40],
+                (false, true) => [80, 65, 50],
+                (false, false) => [170, 190, 210],
+            };
+            pixels.extend(colour.map(|c: i64| (c + noise) as u8));
+        }
+        Rgb { size: SIZE, pixels }
+    }
+
+    fn seen(picture: &Rgb, strokes: &[Stroke]) -> Option<SeenInPhotograph> {
+        let mut mask = vec![0; SIZE.area()];
+        for (i, m) in mask.iter_mut().enumerate() {
+            let [u, v] = [i % 320, i / 320];
+            *m = if (80..280).contains(&u) && v < 120 {
+                255
+            } else {
+                0
+            };
+        }
+        let crown = Outline {
+            size: SIZE,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        };
+        let photo = Photograph {
+            picture,
+            crown: &crown,
+            strokes,
+            leaf_colour: LeafColour::Green,
+            trace_by: TraceBy::Paths,
+        };
+        in_photograph(photo, &CancelToken::new()).expect("opencv")
+    }
+
+    #[test]
+    fn one_stroke_along_the_trunk_shows_all_limbs_of_a_bare_tree() {
+        let found = seen(&picture(false), &[vec![FOOT, TOP]]).expect("wood");
+        assert!(!found.in_leaf);
+        let branches = &found.wood.branches;
+        assert_eq!(branches.tips(), 2, "{branches:?}");
+        assert!(
+            (300.0..350.0).contains(&branches.length_px()),
+            "{branches:?}"
+        );
+        for node in &branches.nodes[1..] {
+            assert!((node.radius_px - 4.0).abs() < 1.2, "{node:?}");
+        }
+        let n_tree = found.tree.iter().filter(|m| **m != 0).count();
+        assert!((2000..3000).contains(&n_tree), "{n_tree}");
+    }
+
+    #[test]
+    fn a_stroke_through_leaves_is_a_branch_whose_width_is_not_seen() {
+        let end = Point2::new(230.0, 40.0);
+        let found = seen(&picture(true), &[vec![FOOT, TOP], vec![TOP, end]]).expect("wood");
+        assert!(found.in_leaf);
+        let nodes = &found.wood.branches.nodes;
+        let tip = nodes.iter().find(|n| (n.position_px - end).norm() < 6.0);
+        assert_eq!(tip.map(|n| n.radius_px), Some(0.0), "{nodes:?}");
+        let masks = &found.wood.at_rest.as_deref().expect("masks").masks;
+        let leaves = masks.leaves.pixels.iter().filter(|m| **m != 0).count();
+        assert!((5900..6700).contains(&leaves), "{leaves}");
+        for (wood, leaf) in masks.wood.pixels.iter().zip(&masks.leaves.pixels) {
+            assert!(u32::from(*wood) + u32::from(*leaf) <= 255);
+        }
+    }
+
+    #[test]
+    fn without_a_stroke_or_bark_on_it_nothing_is_found() {
+        assert!(seen(&picture(false), &[]).is_none());
+        let short = vec![FOOT, Point2::new(160.0, 229.0)];
+        assert!(seen(&picture(false), &[short]).is_none());
+    }
+}
