@@ -341,5 +341,5 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
     }
     scene.tree("", "out");
     let again = scene.photo(&format!("photo.png {strokes}"), "out");
-    assert_eq!(again.status.code(), Some(BAD_USAGE));
+    assert_eq!(again.status.code(), Some(FAILED));
 }
