@@ -90,10 +90,12 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         limits,
         ..
     } = usable;
-    let with_motions = tree
-        .branches
-        .get(trunk.index())
-        .zip(usable.decaying.as_ref());
+    // Scaled to like size, rounding would be motion.
+    let decaying = usable
+        .decaying
+        .as_ref()
+        .filter(|all| all.points.rms_px() >= NOISE_PX);
+    let with_motions = tree.branches.get(trunk.index()).zip(decaying);
     let fundamental = with_motions.and_then(|(trunk, motions)| {
         fundamental(motions, film, trunk.base_px, onset, limits, cancel)
     });
@@ -177,9 +179,7 @@ impl FreeDecay<'_> {
     /// show none. Its own points show it more exactly, but take modes close together for one; in all
     /// points these differ in their shapes.
     fn or_fundamental(&mut self, trunk: &BranchInFilm, by_own_points: Swaying) -> Swaying {
-        // Scaled to like size, rounding would be motion.
-        let is_still = matches!(by_own_points, Err(Unidentified::TooLittleMotion));
-        let Some(found) = self.fundamental.filter(|_| !is_still) else {
+        let Some(found) = self.fundamental else {
             return by_own_points;
         };
         let mode = mode_of(found.mode.mode, &found.mode.ln_sd);
