@@ -193,7 +193,7 @@ impl Document {
 
     fn picture_of(&mut self, bytes: Option<Result<Vec<u8>, String>>) -> Option<Picture> {
         let (Some(note), Some(bytes)) = (&self.note.picture, bytes) else {
-            let filmed = self.note.timing.frames_seen > 0;
+            let filmed = self.note.timing.is_of_film();
             self.warnings.extend(filmed.then(|| {
                 "the capture holds no picture: no frame could be decoded in colour".into()
             }));
@@ -234,7 +234,7 @@ impl Document {
     }
 
     fn leaf_mask_in_folder(&mut self) -> Option<Arc<Luma>> {
-        if self.note.masks.is_none() || self.note.timing.frames_seen > 0 {
+        if self.note.masks.is_none() || self.note.timing.is_of_film() {
             return None;
         }
         match at_rest::leaves(&self.dir, size(&self.note)) {

@@ -7,7 +7,7 @@
 //! pruned before it counts.
 
 use super::attractors::Attractors;
-use super::library::{Library, Subtree};
+use super::library::{Library, Subtree, frame};
 use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
 use crate::random::Generator;
 use nalgebra::{Point2, Point3, Rotation3, Unit, Vector3};
@@ -290,14 +290,12 @@ impl<'a> Engine<'a> {
     /// The branches of a subtree on a branch that are neither outside nor too near to others.
     fn pruned(&self, branch: usize, subtree: &Subtree, turn: u32) -> Vec<Shoot> {
         let axis = self.vector(branch);
-        let Some(along) = Unit::try_new(axis, 1e-9) else {
+        let (Some(along), Some(frame)) = (Unit::try_new(axis, 1e-9), frame(axis)) else {
             return Vec::new();
         };
         let begin = self.joints[self.branches[branch].begin].at;
-        let upright = Rotation3::rotation_between(&Vector3::y(), &along)
-            .unwrap_or(Rotation3::from_axis_angle(&Vector3::x_axis(), TAU / 2.0));
         let angle = TAU * f64::from(turn) / f64::from(TURNS);
-        let place = Rotation3::from_axis_angle(&along, angle) * upright;
+        let place = Rotation3::from_axis_angle(&along, angle) * frame.inverse();
         let mut shoots: Vec<Shoot> = Vec::with_capacity(subtree.branches.len());
         let mut place_of: Vec<Option<usize>> = Vec::with_capacity(subtree.branches.len());
         for own in &subtree.branches {

@@ -1,6 +1,6 @@
 //! Elementary subtrees that a tree is grown of (Tan et al. 2008 sect. 3.1 and fig. 4).
 
-use crate::model::Skeleton;
+use crate::model::{RADIUS_SHARE, Skeleton};
 use nalgebra::{Rotation3, Vector3};
 
 /// Subtrees of a library, at most (Tan et al. 2008 sect. 3.1).
@@ -11,8 +11,6 @@ const MOST_BRANCHES: usize = 10;
 const FEWEST_SUBTREES: usize = 2;
 /// No branch of a subtree is longer than its supporting branch by more than this factor.
 const LONGEST: f64 = 1.2;
-/// Radius of a branch by that of its parent, at most (Tan et al. 2008 sect. 2.2).
-pub(super) const RADIUS_SHARE: f64 = 0.75;
 
 /// A branch of a subtree, where the supporting branch runs from the origin to (0, 1, 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -201,7 +199,7 @@ fn subtrees_of(tree: &Skeleton) -> Vec<Subtree> {
 }
 
 /// The rotation that brings a direction to y; `None` where it has none.
-fn frame(axis: Vector3<f64>) -> Option<Rotation3<f64>> {
+pub(super) fn frame(axis: Vector3<f64>) -> Option<Rotation3<f64>> {
     let along = axis.try_normalize(1e-9)?;
     let turned = Rotation3::rotation_between(&along, &Vector3::y());
     // Straight down has no shortest turn.

@@ -1,11 +1,13 @@
 //! A flat tree in a picture, ready to be stood up in space.
 
 use crate::model::{Node, NodeId, NodeKind, NodeName, Size, Skeleton};
-use crate::signal::convex_hull;
+use crate::signal::{convex_hull, distance_to_segment};
 use nalgebra::{Point2, Point3, Vector2};
 
 /// How far the region reaches beyond the tree, as a share of its height: leaves and twigs stand out.
 const MARGIN: f64 = 0.02;
+/// A node lies on the trunk's line no farther from it than this, px.
+const ON_TRUNK_PX: f64 = 1.0;
 
 /// A flat tree in a picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +24,12 @@ pub struct FlatTree {
 }
 
 impl FlatTree {
+    /// Whether a node there (px) lies on the line of the trunk.
+    pub fn is_on_trunk(&self, at_px: Point2<f64>) -> bool {
+        let mut pieces = self.trunk_px.windows(2);
+        pieces.any(|ends| distance_to_segment(at_px, ends[0], ends[1]) < ON_TRUNK_PX)
+    }
+
     /// Number of its forks, the foot not counted.
     pub fn forks(&self) -> usize {
         let children = self.skeleton.children();

@@ -35,6 +35,11 @@ pub(super) struct Edges {
     pub foot: Option<usize>,
 }
 
+/// A place in a file whose z is up, turned so that y is.
+pub(super) fn from_z_up([x, y, z]: [f64; 3]) -> Point3<f64> {
+    Point3::new(x, z, -y)
+}
+
 impl ModelTree {
     /// The tree of joined places, y up. Places that are the same are one. Places that are joined to
     /// nothing do not count.

@@ -1,9 +1,8 @@
 //! The skeleton in a PLY file: its `edge` elements. z is up, as point clouds have it.
 
 use super::error::ImportError;
-use super::model_tree::{Edges, MOST_PLACES};
+use super::model_tree::{Edges, MOST_PLACES, from_z_up};
 use super::sketch::refuse_more;
-use nalgebra::Point3;
 
 /// How its numbers are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -226,8 +225,7 @@ fn read_element(element: &Element, body: &mut Body, file: &mut Edges) -> Result<
             row.push(number.ok_or_else(|| bad("it is cut off, or holds what is no number"))?);
         }
         match wanted[..] {
-            // z is up there, and y here.
-            [x, y, z] => file.places.push(Point3::new(row[x], row[z], -row[y])),
+            [x, y, z] => file.places.push(from_z_up([row[x], row[y], row[z]])),
             [a, b] => file.edges.push([row[a], row[b]].map(place_number)),
             _ => {}
         }
@@ -261,6 +259,7 @@ fn read_property(property: &Property, body: &mut Body) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
 
     const HEAD: &str = "element vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                         property list uchar int seen\nelement face 0\nproperty list uchar int all\n\

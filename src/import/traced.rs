@@ -5,16 +5,11 @@ use super::error::ImportError;
 use super::flat_tree::FlatTree;
 use super::join::joined;
 use super::sketch::{Sketch, Stroke};
-use crate::model::{BranchGraph, Size, Skeleton};
-use crate::signal::distance_to_segment;
+use crate::model::{BranchGraph, RADIUS_SHARE, Size, Skeleton};
 use nalgebra::Point2;
 
-/// Radius of a branch by that of its parent where it cannot be seen (Tan et al. 2008 sect. 2.2).
-const RADIUS_SHARE: f64 = 0.75;
 /// Up to this share of the tree's height the trunk is as thick as where it is thickest there.
 const FOOT_SHARE: f64 = 0.2;
-/// A node is on the trunk no farther from it than this, px.
-const ON_PX: f64 = 1.0;
 /// A tip is as thick as its branch is so far below it, px.
 const TIP_PX: f64 = 8.0;
 
@@ -42,9 +37,9 @@ pub fn traced(
 /// Radii as they are seen, none larger than that of the parent. Where none is seen a branch begins
 /// with 0.75 of its parent's and tapers to its tip.
 fn assign_radii(flat: &mut FlatTree, branches: &BranchGraph) {
+    let beyond_px = beyond_px(&flat.skeleton);
+    let seen_px = seen_radii_px(flat, branches);
     let skeleton = &mut flat.skeleton;
-    let beyond_px = beyond_px(skeleton);
-    let seen_px = seen_radii_px(skeleton, &flat.trunk_px, branches);
     for i in 1..skeleton.nodes.len() {
         let Some(parent) = skeleton.nodes[i].parent.map(|p| p.index()) else {
             continue;
@@ -72,11 +67,8 @@ fn assign_radii(flat: &mut FlatTree, branches: &BranchGraph) {
 
 /// The radius that is seen of the branch that ends in each node, px; 0 where none is. In the lowest
 /// part of the trunk it is the largest there: the foot may lie in grass or shade.
-fn seen_radii_px(
-    skeleton: &Skeleton,
-    trunk_px: &[Point2<f64>],
-    branches: &BranchGraph,
-) -> Vec<f64> {
+fn seen_radii_px(flat: &FlatTree, branches: &BranchGraph) -> Vec<f64> {
+    let skeleton = &flat.skeleton;
     let mut seen_px = Vec::with_capacity(skeleton.nodes.len());
     let heights = skeleton.nodes.iter().map(|n| n.position.y);
     let low_px = FOOT_SHARE * heights.fold(0.0, f64::max);
@@ -86,9 +78,7 @@ fn seen_radii_px(
         let at_px = skeleton.image_from_model(&node.position);
         let piece = branches.piece_at(at_px, skeleton.image_size);
         let own_px = piece.map_or(0.0, |piece| branches.nodes[piece].radius_px);
-        let mut trunk = trunk_px.windows(2);
-        let is_on_trunk = trunk.any(|ends| distance_to_segment(at_px, ends[0], ends[1]) < ON_PX);
-        is_low.push(is_on_trunk && node.position.y <= low_px);
+        is_low.push(flat.is_on_trunk(at_px) && node.position.y <= low_px);
         if is_low[is_low.len() - 1] {
             most_px = most_px.max(own_px);
         }

@@ -3,9 +3,8 @@
 //! segment ends at its place, and its parent is counted from 0. z is up.
 
 use super::error::ImportError;
-use super::model_tree::{Edges, MOST_PLACES};
+use super::model_tree::{Edges, MOST_PLACES, from_z_up};
 use super::sketch::refuse_more;
-use nalgebra::Point3;
 
 /// What a header says on a line: how many numbers there are of the tree and of each segment, and
 /// where in a segment its place and its parent are.
@@ -77,10 +76,10 @@ impl Columns {
         }
         let mut file = Edges::default();
         for segment in segments {
-            let [x, y, z] = self.place.map(|column| segment[column]);
             let parent = segment[self.parent];
             let own = file.places.len();
-            file.places.push(Point3::new(x, z, -y));
+            file.places
+                .push(from_z_up(self.place.map(|column| segment[column])));
             if parent < 0.0 {
                 file.foot = file.foot.or(Some(own));
             } else if parent.fract() == 0.0 && parent < MOST_PLACES as f64 {
@@ -96,6 +95,7 @@ impl Columns {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
 
     const FORK: &str = "# Tree file.\nheight, x,y,z,radius,parent_id\n\
                         3, 1,2,0,0.1,-1, 1,2,1,0.1,0, 1,3,2,0.1,1, 0,2,2.5,0.1,1, \n";

@@ -9,6 +9,9 @@ use nalgebra::Point2;
 const REACH_RADII: f64 = 1.5;
 const REACH_PX: f64 = 8.0;
 
+/// Radius of a branch by that of its parent where it is not seen (Tan et al. 2008 sect. 2.2).
+pub const RADIUS_SHARE: f64 = 0.75;
+
 /// A joint of a traced branch; the branch runs from the parent to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WoodNode {

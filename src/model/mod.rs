@@ -38,7 +38,7 @@ mod verdict;
 mod wood;
 
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
-pub use branch_graph::{BranchGraph, WoodNode};
+pub use branch_graph::{BranchGraph, RADIUS_SHARE, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;

@@ -46,6 +46,13 @@ pub struct Timing {
 }
 
 impl Timing {
+    /// Whether there is a film; a tree that was drawn, grown or photographed has none.
+    pub fn is_of_film(&self) -> bool {
+        self.frames_seen > 0
+    }
+}
+
+impl Timing {
     /// Notes a hole; the list stays bounded however long the capture runs.
     pub fn push_gap(&mut self, gap: Gap) {
         if self.gaps.len() < MAX_GAPS {

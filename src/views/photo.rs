@@ -11,16 +11,12 @@ use crate::import::FlatTree;
 use crate::model::{Outline, Picture, Rgb, Skeleton, Swaying, Wood};
 use crate::random::generator;
 use crate::shape::{self, Silhouette};
-use crate::signal::distance_to_segment;
-use nalgebra::Point2;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Triangles of all leaves: a photograph shows single ones. With the 20,000 of a film the silhouette of
 /// made photographs is met by 0.76 instead of 0.80.
 const LEAF_TRIANGLES: u32 = 100_000;
-/// A node is on the trunk's line no farther from it than this, px.
-const ON_LINE_PX: f64 = 1.0;
 
 /// The settings that trees of photographs have if no others are given.
 pub fn photo_defaults() -> Config {
@@ -97,7 +93,7 @@ impl PhotoTree {
         }
         let mut tree = DrawnTree::new(name, parts.flat, parts.region, config)?;
         if growth.depth == PhotoDepth::Apart {
-            let trunk = on_line(&tree.skeleton, &parts.flat.trunk_px);
+            let trunk = on_trunk(&tree.skeleton, parts.flat);
             shape::set_depths_apart(&mut tree.skeleton, &trunk);
         }
         let seed = tree.note.config.wood.seed.into();
@@ -174,13 +170,9 @@ fn grow(tree: &mut DrawnTree, region: &Outline, growth: PhotoGrowth, seed: u64) 
     grow_subtrees(&mut tree.skeleton, &library, &region, ROUNDS, random)
 }
 
-/// Whether each node lies on a line in the picture (px).
-fn on_line(skeleton: &Skeleton, line_px: &[Point2<f64>]) -> Vec<bool> {
-    let mut on = Vec::with_capacity(skeleton.nodes.len());
-    for node in &skeleton.nodes {
-        let at = skeleton.image_from_model(&node.position);
-        let mut pieces = line_px.windows(2);
-        on.push(pieces.any(|ends| distance_to_segment(at, ends[0], ends[1]) < ON_LINE_PX));
-    }
-    on
+/// Whether each node lies on the trunk's line.
+fn on_trunk(skeleton: &Skeleton, flat: &FlatTree) -> Vec<bool> {
+    let places = skeleton.nodes.iter().map(|n| &n.position);
+    let places_px = places.map(|at| skeleton.image_from_model(at));
+    places_px.map(|at_px| flat.is_on_trunk(at_px)).collect()
 }

@@ -77,7 +77,7 @@ impl DocumentWriter {
         );
         // A PNG gives back what was put in.
         document.bark = draft.bark.cloned();
-        let is_photo = document.note.timing.frames_seen == 0;
+        let is_photo = !document.note.timing.is_of_film();
         let at_rest = draft.at_rest.filter(|_| is_photo);
         document.leaf_mask = at_rest.map(|at_rest| Arc::new(at_rest.masks.leaves.clone()));
         let options = TreeOptions {
@@ -106,7 +106,7 @@ impl DocumentWriter {
         self.tree.take_sway(found)?;
         let document = &self.tree.document;
         folder.write("nodes.csv", &document.nodes_csv()?)?;
-        if document.note.timing.frames_seen > 0 {
+        if document.note.timing.is_of_film() {
             folder.write(MODES_FILE, &document.modes_csv()?)?;
         }
         let (model, animation) = glb(&self.tree.model())?;

@@ -27,7 +27,7 @@ pub use photograph::{Photograph, SeenInPhotograph, in_photograph};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Wood};
+use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Size, Wood};
 use crate::motion::Spread;
 use crate::signal::median;
 use crate::signal::statistics::median_vector;
@@ -115,7 +115,8 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     if view.shots.len() < LEAST_SHOTS || !view.shots.iter().all(|shot| is_usable(&shot)) {
         return Ok(None);
     }
-    let region = widened(view.outline, farthest_px(view.shots))?;
+    // It was drawn round the tree in one pose, and is to hold it in all.
+    let region = widened(&view.outline.mask, size, farthest_px(view.shots))?;
     let mut steady = steadied(view.shots, view.rest_px, &region, cancel)?;
     let n_rest = AT_REST.min(steady.len() / 3);
     let rest_px = settle(&mut steady, n_rest, view.rest_px);
@@ -191,10 +192,10 @@ fn farthest_px(shots: &[Shot]) -> f64 {
         .unwrap_or(0.0)
 }
 
-/// The outline, which was drawn round the tree in one pose, widened to hold it in all.
-fn widened(outline: &Outline, by_px: f64) -> opencv::Result<Vec<u8>> {
-    let (rows, cols) = (outline.size.height as i32, outline.size.width as i32);
-    let mask = Mat::new_rows_cols_with_data(rows, cols, &outline.mask)?;
+/// A mask (row by row, of a picture of this `size`) widened by so much to all sides.
+fn widened(mask: &[u8], size: Size, by_px: f64) -> opencv::Result<Vec<u8>> {
+    let (rows, cols) = (size.height as i32, size.width as i32);
+    let mask = Mat::new_rows_cols_with_data(rows, cols, mask)?;
     let side = 2 * by_px.ceil().clamp(0.0, f64::from(cols)) as i32 + 1;
     let middle = opencv::core::Point::new(-1, -1);
     let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;

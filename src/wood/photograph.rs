@@ -84,7 +84,7 @@ pub fn in_photograph(
     let Some(foot_px) = photo.strokes.first().and_then(|trunk| trunk.first()) else {
         return Ok(None);
     };
-    let crown = widened(photo.crown, FREEDOM_PX)?;
+    let crown = widened(&photo.crown.mask, size, FREEDOM_PX)?;
     let Some(leaves) = foliage(photo.picture, &crown, photo.leaf_colour, cancel) else {
         return Ok(None);
     };
@@ -134,13 +134,7 @@ pub fn in_photograph(
 /// Leaves without the pieces of a lawn or a bush that lie within the crown stroke: those that are
 /// small and apart from the others.
 fn without_far_pieces(mut leaves: Vec<u8>, size: Size) -> opencv::Result<Vec<u8>> {
-    let closed = Outline {
-        size,
-        mask: leaves.clone(),
-        polygon_px: Vec::new(),
-        matte: None,
-    };
-    let joined = widened(&closed, CLUMP_SHARE * f64::from(size.width))?;
+    let joined = widened(&leaves, size, CLUMP_SHARE * f64::from(size.width))?;
     let n_joined = joined.iter().filter(|m| **m != 0).count();
     let most = (SMALL_PIECE * n_joined as f64) as usize;
     let is_small = Parts::of(&joined, size, 8)?.no_larger_than(most);

@@ -71,7 +71,7 @@ pub struct Onset {
     pub to: usize,
 }
 
-/// What made a film's tree sway, and what else is had where that is told.
+/// What made a film's tree sway, and what was worked out on the way to that.
 pub(super) struct FoundOnset {
     pub onset: Onset,
     /// Where there are several releases, when each was, s.
