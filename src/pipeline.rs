@@ -40,7 +40,7 @@ pub use front::FrontEnd;
 pub use grown::stand_grown;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
-pub use reshape::{MOST_RESHAPED, cut_to, push_terms, reshape};
+pub use reshape::{MOST_RESHAPED, cut_to, grown_terms, reshape};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;

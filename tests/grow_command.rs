@@ -5,7 +5,9 @@ mod support;
 use arborcam::document::note::ModelNote;
 use arborcam::document::{CaptureNote, Document};
 use arborcam::model::{NodeKind, Skeleton, Timing};
-use arborcam::views::{Draft, write_document};
+use arborcam::pipeline::reshape;
+use arborcam::shape::{Angles, Envelope, envelope_distance};
+use arborcam::views::{Draft, example_outline, write_document};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -335,4 +337,37 @@ fn an_example_that_says_nothing_is_refused() {
         assert!(told.contains(expected), "{told}");
         assert!(!out.exists());
     }
+}
+
+/// New trees fill the example's envelope as well as it does and have angles as likely as its: medians
+/// of twenty, with some room for chance.
+#[test]
+fn new_trees_stand_in_space_as_the_example_does() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("trees");
+    let more = ["--count", "20", "--seed", "9", "--motion", "none"];
+    let trees = grown(&out, &more);
+    let document = Document::read(example(), 0.0).expect("a capture");
+    let config = &document.note.config;
+    let outline = example_outline(&document).expect("an outline");
+    let stood = reshape(&document.skeleton, outline, config);
+    let places: Vec<_> = stood.nodes.iter().map(|n| n.position).collect();
+    let envelope = Envelope::of_filmed(config.shape.envelope, outline, stood.foot_px, &places);
+    let attractors = config.shape.attractors as usize;
+    let distance_px = |tree: &Skeleton| envelope_distance(tree, &envelope, attractors);
+    let likelihood = |tree: &Skeleton| Angles::of(tree, &config.shape).likelihood(tree);
+    let (mut fillings, mut plausibilities) = (Vec::new(), Vec::new());
+    for tree in &trees {
+        let tree = &tree.skeleton;
+        fillings.push(distance_px(&stood) / distance_px(tree));
+        plausibilities.push(likelihood(tree) / likelihood(&stood));
+    }
+    let (filling, plausibility) = (median(fillings), median(plausibilities));
+    assert!(filling > 0.9, "{filling}");
+    assert!(plausibility > 0.9, "{plausibility}");
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
 }

@@ -20,11 +20,11 @@ pub const FEWEST_FORKS: usize = 3;
 const HAND: usize = 24;
 /// Trees of which the one that fills the region best is taken.
 const TREES: u32 = 24;
-/// How often bifurcations are tried: first where they are to grow, then at random tips.
-const ROUNDS: u32 = 4;
-/// A direction that is less likely than this, as a share of the likeliest, is not taken: without it
-/// 95 % of a normal distribution are left.
-const LEAST_LIKELIHOOD: f64 = 0.147;
+/// How often bifurcations are tried, first where they are to grow, then at random tips, and how
+/// likely a direction must be each time, as a share of the likeliest: 83 %, 91 % and 95 % of a normal
+/// distribution are left. Near the border of the region only odd directions fit, and elsewhere
+/// there may be room in a natural one.
+const LEAST_LIKELIHOOD: [f64; 4] = [0.383, 0.237, 0.147, 0.147];
 /// No branch is shorter than this share of the region's height.
 const SHORTEST: f64 = 0.01;
 /// A direction that brings every place nearer by this share of the region's width says next to
@@ -244,7 +244,8 @@ fn directions(tree: &[Node2d], children: &[Vec<usize>], carried: &[usize]) -> [V
         let mut beside = children[below].iter().filter(|child| **child != i);
         let leads = beside.all(|child| carried[*child] < carried[i]);
         let from_px = tree[below].position_px;
-        let angle = outward(tree[0].position_px, from_px, node.position_px);
+        let turn = turn(from_px - tree[0].position_px, node.position_px - from_px);
+        let angle = turn.y.atan2(turn.x);
         let kind = if leads { &mut leading } else { &mut others };
         kind.extend([angle, -angle]);
     }
@@ -264,10 +265,10 @@ fn deepest(tree: &[Node2d], children: &[Vec<usize>]) -> u8 {
     levels.into_iter().max().unwrap_or(0)
 }
 
-/// Angle between the direction from the foot and that of a branch, clockwise, radians.
-fn outward(foot_px: Point2<f64>, from_px: Point2<f64>, to_px: Point2<f64>) -> f64 {
-    let (out, way) = (from_px - foot_px, to_px - from_px);
-    out.perp(&way).atan2(out.dot(&way))
+/// The angle from the direction `out` clockwise to that of a branch, as a unit vector: its cosine and
+/// its sine.
+fn turn(out: Vector2<f64>, way: Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(out.dot(&way), out.perp(&way)).normalize()
 }
 
 /// Grows a tree in `region`, from a foot at `foot_px`. `scale` is how much larger it is to be than
@@ -314,13 +315,14 @@ pub fn grow_flat(
 /// A tree on a trunk.
 fn grown<'a>(mut trunk: Growth<'a>, random: &mut Generator) -> Growth<'a> {
     let example = trunk.example;
-    let mut unused: Vec<Bifurcation> = Vec::with_capacity(example.forks);
-    unused.resize_with(example.forks, || example.sample(random));
+    let mut unused: Vec<BranchPair> = Vec::with_capacity(example.forks);
+    unused.resize_with(example.forks, || BranchPair::of(&example.sample(random)));
     let mut leaves = vec![Leaf {
         node: 1,
         forks: example.forks,
     }];
-    for _ in 0..ROUNDS {
+    for least_likelihood in LEAST_LIKELIHOOD {
+        trunk.least_likelihood = least_likelihood;
         trunk.round(leaves, &mut unused, random);
         leaves = trunk.shared_out(unused.len(), random);
     }
@@ -337,6 +339,8 @@ struct Growth<'a> {
     first_stem_px: f64,
     shortest_px: f64,
     gain_floor_px: f64,
+    /// A direction that is less likely, as a share of the likeliest, is not taken now.
+    least_likelihood: f64,
 }
 
 /// A tip that is to carry so many forks.
@@ -390,6 +394,7 @@ impl<'a> Growth<'a> {
             shortest_px: SHORTEST * space.height_px(),
             gain_floor_px: GAIN_FLOOR * space.width_px(),
             first_stem_px: example.first_stem_px() * scale,
+            least_likelihood: 1.0,
             space,
         })
     }
@@ -399,15 +404,16 @@ impl<'a> Growth<'a> {
     fn round(
         &mut self,
         mut leaves: Vec<Leaf>,
-        unused: &mut Vec<Bifurcation>,
+        unused: &mut Vec<BranchPair>,
         random: &mut Generator,
     ) {
         while let Some(leaf) = take_fullest(&mut leaves) {
             if self.tree[leaf.node].level >= self.example.deepest {
                 continue;
             }
-            unused.shuffle(random);
             let hand = HAND.min(unused.len());
+            let _ = unused.partial_shuffle(random, hand);
+            unused.rotate_right(hand);
             let (some, others) = (0..hand, hand..unused.len());
             let way = self
                 .best_way(leaf.node, unused, some)
@@ -445,15 +451,16 @@ impl<'a> Growth<'a> {
     fn best_way(
         &self,
         leaf: usize,
-        bifurcations: &[Bifurcation],
+        bifurcations: &[BranchPair],
         from: Range<usize>,
     ) -> Option<Way> {
         let apex = self.tree[leaf].position_px;
+        let stem = self.stem(leaf)?;
         let mut ways = Vec::with_capacity(2 * from.len());
         for number in from {
-            let bifurcation = &bifurcations[number];
-            for is_mirrored in [false, true] {
-                ways.extend(self.way(leaf, number, bifurcation, is_mirrored));
+            let own = bifurcations[number];
+            for pair in [own, own.mirrored()] {
+                ways.extend(self.way(apex, stem, number, pair));
             }
         }
         let lengths_px = ways.iter().flat_map(|way| way.lengths_px(apex));
@@ -470,34 +477,31 @@ impl<'a> Growth<'a> {
         best.map(|(_, way)| way)
     }
 
-    /// With a bifurcation whose left branch leads on, or with its mirror image. `None` where it leaves
-    /// the region, or has a branch that is too short or goes in too unlikely a direction.
-    fn way(
-        &self,
-        leaf: usize,
-        number: usize,
-        bifurcation: &Bifurcation,
-        is_mirrored: bool,
-    ) -> Option<Way> {
+    /// The way down the stem below `leaf` in the length that it counts with, px.
+    fn stem(&self, leaf: usize) -> Option<Vector2<f64>> {
         let apex = self.tree[leaf].position_px;
         let stem = self.tree[self.tree[leaf].parent?].position_px - apex;
-        let stem_px = if leaf == 1 {
-            self.first_stem_px
-        } else {
-            stem.norm()
-        };
-        let stem = stem.normalize() * stem_px;
-        let ends_px = if is_mirrored {
-            let [left, right] = branches(&bifurcation.mirrored(), apex, stem);
-            [right, left]
-        } else {
-            branches(bifurcation, apex, stem)
-        };
-        let foot_px = self.tree[0].position_px;
-        let [leading, other] = ends_px.map(|end| outward(foot_px, apex, end));
-        let leading = self.example.leading.likelihood(leading);
-        let other = self.example.others.likelihood(other);
-        if leading.min(other) < LEAST_LIKELIHOOD {
+        Some(match leaf {
+            1 => stem.normalize() * self.first_stem_px,
+            _ => stem,
+        })
+    }
+
+    /// With a bifurcation on a stem. `None` where it leaves the region, or has a branch that is too
+    /// short or goes in too unlikely a direction.
+    fn way(
+        &self,
+        apex: Point2<f64>,
+        stem: Vector2<f64>,
+        number: usize,
+        pair: BranchPair,
+    ) -> Option<Way> {
+        let ends_px = pair.ends_px(apex, stem);
+        let out = apex - self.tree[0].position_px;
+        let [leading, other] = ends_px.map(|end| turn(out, end - apex));
+        let leading = self.example.leading.likelihood_towards(leading);
+        let other = self.example.others.likelihood_towards(other);
+        if leading.min(other) < self.least_likelihood {
             return None;
         }
         let fits = ends_px
@@ -538,15 +542,37 @@ fn new_node(parent: Option<usize>, level: u8, position_px: Point2<f64>) -> Node2
     }
 }
 
-/// Where the branches of a fork at `apex` end, left and right, with `stem` the way down its stem, px.
-fn branches(bifurcation: &Bifurcation, apex: Point2<f64>, stem: Vector2<f64>) -> [Point2<f64>; 2] {
-    let [stem_share, left, right] = bifurcation.lengths;
-    let down = stem / stem_share.max(f64::MIN_POSITIVE);
-    let [to_left, between, _] = bifurcation.angles.map(|share| share * TAU);
-    [
-        apex + Rotation2::new(to_left) * down * left,
-        apex + Rotation2::new(to_left + between) * down * right,
-    ]
+/// Where the branches of a bifurcation end, seen from its apex with the way down the stem as the first
+/// axis and as the unit of length; the second axis is a quarter turn clockwise from it.
+#[derive(Clone, Copy, Debug)]
+struct BranchPair {
+    leading: Vector2<f64>,
+    other: Vector2<f64>,
+}
+
+impl BranchPair {
+    /// Of one whose left branch leads on.
+    fn of(bifurcation: &Bifurcation) -> Self {
+        let [stem, left, right] = bifurcation.lengths;
+        let [to_left, between, _] = bifurcation.angles.map(|share| share * TAU);
+        let unit = Vector2::x() / stem.max(f64::MIN_POSITIVE);
+        Self {
+            leading: Rotation2::new(to_left) * unit * left,
+            other: Rotation2::new(to_left + between) * unit * right,
+        }
+    }
+
+    /// Its mirror image.
+    fn mirrored(self) -> Self {
+        let [leading, other] = [self.leading, self.other].map(|way| Vector2::new(way.x, -way.y));
+        Self { leading, other }
+    }
+
+    /// On a fork at `apex` with `stem` the way down its stem, px.
+    fn ends_px(self, apex: Point2<f64>, stem: Vector2<f64>) -> [Point2<f64>; 2] {
+        let clockwise = Vector2::new(-stem.y, stem.x);
+        [self.leading, self.other].map(|way| apex + stem * way.x + clockwise * way.y)
+    }
 }
 
 #[cfg(test)]
@@ -596,7 +622,7 @@ mod tests {
             let below = tree[tree[leaf].parent.expect("a stem")].position_px;
             let level = tree[leaf].level + 1;
             let apex = tree[leaf].position_px;
-            for end in branches(&fork, apex, below - apex) {
+            for end in BranchPair::of(&fork).ends_px(apex, below - apex) {
                 leaves.push(tree.len());
                 tree.push(new_node(Some(leaf), level, end));
             }
@@ -616,7 +642,7 @@ mod tests {
             lengths: [0.5, 0.2, 0.3],
         };
         let (apex, below) = (Point2::new(3.0, 4.0), Point2::new(9.0, 12.0));
-        let ends = branches(&fork, apex, below - apex);
+        let ends = BranchPair::of(&fork).ends_px(apex, below - apex);
         let tree = [
             new_node(None, 0, below),
             new_node(Some(0), 1, apex),

@@ -1,7 +1,6 @@
-//! How the branches of an example sway, learned from their spectra, and a loop of a new tree that
-//! sways so (Li 2011 sect. 5.1 and 5.2).
+//! How the branches of an example sway, by their spectra, and a loop of a new tree that sways so
+//! (Li 2011 sect. 5.1 and 5.2).
 
-use super::dirichlet::{Dirichlet, fit};
 use crate::model::{NodeId, Pose, Skeleton, Swaying, Unidentified};
 use crate::random::Generator;
 use crate::signal::interpolation::linear;
@@ -23,17 +22,16 @@ const HIGHEST_RATE_HZ: f64 = 30.0;
 const KEPT: usize = 5;
 /// Energy that a window of von Hann leaves of a signal.
 const HANN_ENERGY: f64 = 3.0 / 8.0;
-/// A branch that turns less than this about an axis (root of the sum of squares of its amplitudes,
-/// rad) does not sway.
+/// A branch that turns less than this (root of the sum of squares of its amplitudes, rad) does not
+/// sway.
 const LEAST_TURN: f64 = 1e-6;
 
 /// How the measured branches of an example sway.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionStatistics {
-    /// By axis: model axes x, y, z.
-    axes: [AxisSpectrum; 3],
-    /// How strongly each branch sways in each piece of the film, and its level.
-    strengths: Vec<Strength>,
+    /// Of every branch in every piece of the film.
+    spectra: Vec<TurnSpectrum>,
+    /// The levels of these branches.
     levels: Vec<f64>,
     /// Steps of a piece, and how long one is, s.
     steps: usize,
@@ -41,26 +39,11 @@ pub struct MotionStatistics {
     deepest: u8,
 }
 
-/// How the energy of the sway about one axis is distributed over the frequencies, from that of the
-/// piece's length up. `None` where no branch sways about it.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct AxisSpectrum {
-    cosines: Option<Dirichlet>,
-    sines: Option<Dirichlet>,
-}
-
-/// How strongly a branch sways.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Strength {
-    /// Sums of the squares of its amplitudes about each axis, rad².
-    cosines: [f64; 3],
-    sines: [f64; 3],
-}
-
-/// The amplitudes of one branch about one axis in one piece, rad, by frequency.
-struct Amplitudes {
-    cosines: Vec<f64>,
-    sines: Vec<f64>,
+/// How one branch turns in one piece of the film: its complex amplitudes about the model axes x, y
+/// and z, radians, by frequency from that of the piece's length up. What is above is left out.
+#[derive(Clone, Debug, PartialEq)]
+struct TurnSpectrum {
+    axes: [Vec<Complex<f64>>; 3],
 }
 
 impl MotionStatistics {
@@ -68,11 +51,13 @@ impl MotionStatistics {
     /// where the film is shorter than two seconds, its times do not grow, or nothing sways.
     ///
     /// The film is cut into pieces of ten seconds, each under a window of von Hann (Welch 1967).
-    /// The paper's tuples are the real parts and the imaginary parts of the Fourier coefficients,
-    /// "shifted so that no term is negative" and scaled to a sum of 1. Shifted so, all frequencies
-    /// have the same mean and vary alike, and what is drawn is noise without a dominant frequency.
-    /// Here the tuples are the squares of both, "the ratio between the energy of each given
-    /// frequency"; no shift is needed, and signs are drawn evenly.
+    ///
+    /// The paper learns one Dirichlet distribution of the real parts and one of the imaginary parts of
+    /// all coefficients, "shifted so that no term is negative". Shifted so, all frequencies have the
+    /// same mean and vary alike, and what is drawn is noise without a dominant frequency. Of their
+    /// squares it would be "the ratio between the energy of each given frequency"; but neighbouring
+    /// frequencies are drawn independently of each other, so that a peak that every branch has
+    /// falls apart. So spectra are kept as they are, see [`sample`](Self::sample).
     pub fn of(skeleton: &Skeleton, poses: &[Pose]) -> Option<Self> {
         let (n, measured) = (skeleton.nodes.len(), skeleton.measured());
         let poses: Vec<&Pose> = poses.iter().filter(|p| p.joints.len() == n).collect();
@@ -97,7 +82,7 @@ impl MotionStatistics {
             steps,
             forward: RealFftPlanner::new().plan_fft_forward(steps),
         };
-        let mut gathered = Gathered::default();
+        let (mut spectra, mut levels) = (Vec::new(), Vec::new());
         for branch in skeleton.moving_branches() {
             if branch.node.index() >= measured {
                 continue;
@@ -105,20 +90,14 @@ impl MotionStatistics {
             let level = skeleton.nodes[branch.node.index()].level;
             let turns: Vec<Vector3<f64>> = poses.iter().map(|p| branch.own_turn(p)).collect();
             for piece in 0..pieces.count {
-                gathered.add(level, &pieces.amplitudes(&turns, piece)?);
+                spectra.push(pieces.spectrum(&turns, piece)?);
+                levels.push(f64::from(level));
             }
         }
-        let axes = gathered.axes.map(|axis| AxisSpectrum {
-            cosines: fit(&axis.cosines).map(|f| f.distribution),
-            sines: fit(&axis.sines).map(|f| f.distribution),
-        });
-        let sways = axes
-            .iter()
-            .any(|a| a.cosines.is_some() || a.sines.is_some());
+        let sways = spectra.iter().any(TurnSpectrum::sways);
         sways.then_some(Self {
-            axes,
-            strengths: gathered.strengths,
-            levels: gathered.levels,
+            spectra,
+            levels,
             steps,
             step_s: piece_s / steps as f64,
             deepest: skeleton.deepest_level(),
@@ -126,8 +105,11 @@ impl MotionStatistics {
     }
 
     /// A loop of a tree that sways like the example: poses at even times, the last of which is the
-    /// first again. Each branch turns by at most `most_rad` against its carrier, and a copy in its
-    /// own plane.
+    /// first again. Each branch has the spectrum of a branch of the example of about its level in one
+    /// piece of the film, and phases of its own, which are the same about all three axes: so it swings
+    /// in the same directions and at the same frequencies, and yet otherwise (surrogate data with
+    /// random phases, Prichard and Theiler 1994). It turns by at most `most_rad` against its carrier,
+    /// and a copy in its own plane.
     pub fn sample(&self, skeleton: &Skeleton, most_rad: f64, random: &mut Generator) -> Vec<Pose> {
         let branches = skeleton.moving_branches();
         let levels = LevelShares::of(skeleton);
@@ -166,13 +148,14 @@ impl MotionStatistics {
         let Some(of) = at_level(&self.levels, wanted, random) else {
             return turns;
         };
-        let strength = self.strengths[of];
-        for (axis, spectrum) in self.axes.iter().enumerate() {
-            let amplitudes = Amplitudes {
-                cosines: drawn(&spectrum.cosines, strength.cosines[axis], random),
-                sines: drawn(&spectrum.sines, strength.sines[axis], random),
-            };
-            for (turn, angle) in turns.iter_mut().zip(synthesis.angles(&amplitudes)) {
+        let spectrum = &self.spectra[of];
+        let mut phases = Vec::new();
+        for _ in &spectrum.axes[0] {
+            phases.push(Complex::cis(random.random_range(0.0..TAU)));
+        }
+        for (axis, amplitudes) in spectrum.axes.iter().enumerate() {
+            let angles = synthesis.angles(amplitudes, &phases);
+            for (turn, angle) in turns.iter_mut().zip(angles) {
                 turn[axis] = *angle;
             }
         }
@@ -180,15 +163,11 @@ impl MotionStatistics {
     }
 }
 
-/// Amplitudes whose squares are drawn, with signs that are drawn evenly; none where nothing sways.
-fn drawn(shares: &Option<Dirichlet>, strength: f64, random: &mut Generator) -> Vec<f64> {
-    let mut amplitudes = Vec::new();
-    let shares = shares.as_ref().map(|of| of.sample(random));
-    for share in shares.into_iter().flatten() {
-        let sign = if random.random::<bool>() { 1.0 } else { -1.0 };
-        amplitudes.push(sign * (share * strength).sqrt());
+impl TurnSpectrum {
+    fn sways(&self) -> bool {
+        let energy: f64 = self.axes.iter().flatten().map(Complex::norm_sqr).sum();
+        energy >= LEAST_TURN * LEAST_TURN
     }
-    amplitudes
 }
 
 /// From amplitudes to the angles of a loop.
@@ -208,14 +187,13 @@ impl Synthesis {
         }
     }
 
-    /// The angle at each step of a loop, radians.
-    fn angles(&mut self, amplitudes: &Amplitudes) -> &[f64] {
+    /// The angle at each step of a loop, radians, with the phase of each frequency turned by one of
+    /// `phases`, of length 1.
+    fn angles(&mut self, amplitudes: &[Complex<f64>], phases: &[Complex<f64>]) -> &[f64] {
         self.spectrum.fill(Complex::default());
-        for (bin, a) in self.spectrum[1..].iter_mut().zip(&amplitudes.cosines) {
-            bin.re = 0.5 * a;
-        }
-        for (bin, b) in self.spectrum[1..].iter_mut().zip(&amplitudes.sines) {
-            bin.im = -0.5 * b;
+        let turned = amplitudes.iter().zip(phases).map(|(a, phase)| a * phase);
+        for (bin, amplitude) in self.spectrum[1..].iter_mut().zip(turned) {
+            *bin = 0.5 * amplitude;
         }
         let (spectrum, angles) = (&mut self.spectrum, &mut self.angles);
         if self.inverse.process(spectrum, angles).is_err() {
@@ -224,50 +202,6 @@ impl Synthesis {
         }
         &self.angles
     }
-}
-
-/// What was found in all pieces of all branches.
-#[derive(Default)]
-struct Gathered {
-    strengths: Vec<Strength>,
-    levels: Vec<f64>,
-    axes: [Tuples; 3],
-}
-
-/// Tuples of shares about one axis.
-#[derive(Default)]
-struct Tuples {
-    cosines: Vec<Vec<f64>>,
-    sines: Vec<Vec<f64>>,
-}
-
-impl Gathered {
-    fn add(&mut self, level: u8, by_axis: &[Amplitudes; 3]) {
-        let strength = Strength {
-            cosines: std::array::from_fn(|axis| energy(&by_axis[axis].cosines)),
-            sines: std::array::from_fn(|axis| energy(&by_axis[axis].sines)),
-        };
-        for (axis, amplitudes) in by_axis.iter().enumerate() {
-            let tuples = &mut self.axes[axis];
-            tuples
-                .cosines
-                .extend(shares(&amplitudes.cosines, strength.cosines[axis]));
-            tuples
-                .sines
-                .extend(shares(&amplitudes.sines, strength.sines[axis]));
-        }
-        self.strengths.push(strength);
-        self.levels.push(f64::from(level));
-    }
-}
-
-fn energy(amplitudes: &[f64]) -> f64 {
-    amplitudes.iter().map(|a| a * a).sum()
-}
-
-/// The squares as shares of their sum; `None` where that is nothing.
-fn shares(amplitudes: &[f64], sum: f64) -> Option<Vec<f64>> {
-    (sum >= LEAST_TURN * LEAST_TURN).then(|| amplitudes.iter().map(|a| a * a / sum).collect())
 }
 
 /// Pieces of a film, one after the other.
@@ -281,9 +215,8 @@ struct Pieces<'a> {
 }
 
 impl Pieces<'_> {
-    /// The amplitudes of a branch that turns as `turns` says by pose, by axis. `None` where they are
-    /// no numbers.
-    fn amplitudes(&self, turns: &[Vector3<f64>], piece: usize) -> Option<[Amplitudes; 3]> {
+    /// The spectrum of a branch that turns as `turns` says by pose. `None` where it is no number.
+    fn spectrum(&self, turns: &[Vector3<f64>], piece: usize) -> Option<TurnSpectrum> {
         let axes = [0, 1, 2].map(|axis| {
             let own: Vec<f64> = turns.iter().map(|t| t[axis]).collect();
             self.of_axis(&own, piece)
@@ -291,10 +224,10 @@ impl Pieces<'_> {
         let [Some(x), Some(y), Some(z)] = axes else {
             return None;
         };
-        Some([x, y, z])
+        Some(TurnSpectrum { axes: [x, y, z] })
     }
 
-    fn of_axis(&self, angles: &[f64], piece: usize) -> Option<Amplitudes> {
+    fn of_axis(&self, angles: &[f64], piece: usize) -> Option<Vec<Complex<f64>>> {
         let kept = self.steps / 2 / KEPT;
         let (from_s, step_s) = (
             piece as f64 * self.piece_s,
@@ -312,11 +245,7 @@ impl Pieces<'_> {
         let mut spectrum = self.forward.make_output_vec();
         self.forward.process(&mut even, &mut spectrum).ok()?;
         let scale = 2.0 / self.steps as f64;
-        let bins = &spectrum[1..=kept];
-        Some(Amplitudes {
-            cosines: bins.iter().map(|x| x.re * scale).collect(),
-            sines: bins.iter().map(|x| -x.im * scale).collect(),
-        })
+        Some(spectrum[1..=kept].iter().map(|x| x * scale).collect())
     }
 }
 

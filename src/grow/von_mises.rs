@@ -1,6 +1,7 @@
 //! The von Mises distribution of angles (Zeng 2015 eq. 2.25).
 
 use crate::random::Generator;
+use nalgebra::Vector2;
 use rand::RngExt;
 use std::f64::consts::{PI, TAU};
 
@@ -19,6 +20,8 @@ pub struct VonMises {
     pub mean: f64,
     /// 0 is even all round, more is narrower.
     pub kappa: f64,
+    /// The mean as a unit vector.
+    towards: Vector2<f64>,
     /// exp(-kappa) I0(kappa).
     scaled_i0: f64,
 }
@@ -37,6 +40,7 @@ impl VonMises {
         Self {
             mean,
             kappa,
+            towards: Vector2::new(mean.cos(), mean.sin()),
             scaled_i0: scaled_bessel(kappa).order_0,
         }
     }
@@ -64,6 +68,11 @@ impl VonMises {
 
     fn likelihood_off_mean(&self, off: f64) -> f64 {
         (self.kappa * (off.cos() - 1.0)).exp()
+    }
+
+    /// The same of an angle as a unit vector: its cosine and its sine.
+    pub fn likelihood_towards(&self, angle: Vector2<f64>) -> f64 {
+        (self.kappa * (angle.dot(&self.towards) - 1.0)).exp()
     }
 
     /// How far from the mean the density is above `threshold` (1/rad), radians: pi where it is

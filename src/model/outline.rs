@@ -20,10 +20,7 @@ impl Outline {
     /// Whether the pixel nearest to (`u_px`, `v_px`) is tree; outside the picture nothing is.
     pub fn contains(&self, u_px: f64, v_px: f64) -> bool {
         self.size.contains(Point2::new(u_px, v_px)) && {
-            let (u, v) = (
-                u_px.round().max(0.0) as usize,
-                v_px.round().max(0.0) as usize,
-            );
+            let [u, v] = [u_px, v_px].map(|px| (px + 0.5) as usize);
             self.mask[v * self.size.width as usize + u] != 0
         }
     }

@@ -38,10 +38,17 @@ pub fn reshape(old: &Skeleton, outline: &Outline, config: &Config) -> Skeleton {
     in_depth_of(&straight, old, next)
 }
 
-/// How the terms of the push weigh where the tree stands as `config` says.
-pub fn push_terms(skeleton: &Skeleton, outline: &Outline, config: &Config) -> Terms {
+/// How the terms of the push weigh for trees like the one of `skeleton`, of which `samples` were grown
+/// in its outline.
+pub fn grown_terms(
+    skeleton: &Skeleton,
+    samples: &[Vec<skeleton::Node2d>],
+    outline: &Outline,
+    config: &Config,
+) -> Terms {
     let Flat { nodes, tracks } = Flat::of(skeleton, &skeleton.foot_and_branches());
-    shape::tuned_terms(&nodes, &tracks, outline, &config.shape)
+    let example = shape::Tuned::of(&nodes, &tracks, outline, &config.shape);
+    shape::grown_terms(&example, samples, outline, &config.shape)
 }
 
 /// The measured nodes of a tree in the picture, and how many points are on each.

@@ -18,24 +18,33 @@ pub fn build(
     outline: &Outline,
     settings: &config::Shape,
 ) -> Skeleton {
-    let Prototype {
-        mut skeleton,
-        envelope,
-        trunk,
-    } = Prototype::of(flat, tracks, outline, settings);
-    tune_term_weights(&mut skeleton, &trunk, &envelope, settings);
-    skeleton
+    Tuned::of(flat, tracks, outline, settings).skeleton
 }
 
-/// How the two terms weigh for the tree that [`build`] makes of the same.
-pub fn tuned_terms(
-    flat: &[Node2d],
-    tracks: &[u32],
-    outline: &Outline,
-    settings: &config::Shape,
-) -> Terms {
-    let mut it = Prototype::of(flat, tracks, outline, settings);
-    tune_term_weights(&mut it.skeleton, &it.trunk, &it.envelope, settings)
+/// A tree in space, and what it was pushed by.
+pub struct Tuned {
+    pub skeleton: Skeleton,
+    /// How the two terms weigh that suit it best.
+    pub terms: Terms,
+    pub envelope: Envelope,
+}
+
+impl Tuned {
+    /// As [`build`].
+    pub fn of(
+        flat: &[Node2d],
+        tracks: &[u32],
+        outline: &Outline,
+        settings: &config::Shape,
+    ) -> Self {
+        let mut it = Prototype::of(flat, tracks, outline, settings);
+        let terms = tune_term_weights(&mut it.skeleton, &it.trunk, &it.envelope, settings);
+        Self {
+            skeleton: it.skeleton,
+            terms,
+            envelope: it.envelope,
+        }
+    }
 }
 
 /// As [`build`], with weights of the two terms that are known from another tree of the same form:

@@ -7,11 +7,11 @@ use crate::document::note::{BarkNote, CaptureNote, LeavesNote, ModelNote, Outlin
 use crate::document::{BARK_FILE, Document};
 use crate::geometry::{Foliage, Template, leaf_palette};
 use crate::grow::{
-    ForkStatistics, LOOP_S, MotionStatistics, Resampling, SideAngles, grow_flat, resample,
-    sample_sway,
+    ForkStatistics, GrowError, LOOP_S, MotionStatistics, Resampling, SideAngles, grow_flat,
+    resample, sample_sway,
 };
 use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Unidentified};
-use crate::pipeline::{MOST_RESHAPED, push_terms, reshape, stand_grown};
+use crate::pipeline::{MOST_RESHAPED, grown_terms, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
 use crate::shape::Terms;
 use std::path::{Path, PathBuf};
@@ -19,6 +19,9 @@ use std::sync::Arc;
 
 /// Poses of a loop in wind, Hz.
 const WIND_RATE_HZ: f64 = 30.0;
+/// Trees that are grown to see how the terms of their push should weigh, and their seed.
+const SAMPLES: u64 = 5;
+const SAMPLE_SEED: u64 = 1;
 
 /// In what new trees are like the example.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,13 +70,36 @@ pub struct Parent {
 enum Form {
     Forks {
         statistics: ForkStatistics,
-        /// Of the push that stands the example up.
+        /// Of the push that stands trees like the example up.
         terms: Terms,
     },
     Branches {
         angles: SideAngles,
         how: Resampling,
     },
+}
+
+impl Form {
+    /// Of forks, from a tree with this outline.
+    fn forks(example: &Skeleton, outline: &Outline, config: &Config) -> Result<Self, GrowError> {
+        let statistics = ForkStatistics::of(example)?;
+        let mut samples = Vec::new();
+        for k in 0..SAMPLES {
+            let random = &mut generator(SAMPLE_SEED, k);
+            // In a region that is asked for there may be room where the example's outline has none.
+            samples.extend(grow_flat(
+                &statistics,
+                outline,
+                example.foot_px,
+                1.0,
+                random,
+            ));
+        }
+        Ok(Self::Forks {
+            terms: grown_terms(example, &samples, outline, config),
+            statistics,
+        })
+    }
 }
 
 /// What was learned of its motion.
@@ -112,10 +138,7 @@ impl Parent {
         let region = options.region.unwrap_or_else(|| own.clone());
         for_new_trees(&mut config.shape, &options.likeness);
         let form = match options.likeness {
-            Likeness::Forks => Form::Forks {
-                statistics: ForkStatistics::of(&document.skeleton)?,
-                terms: push_terms(&document.skeleton, &own, &config),
-            },
+            Likeness::Forks => Form::forks(&document.skeleton, &own, &config)?,
             Likeness::Branches(how) => Form::Branches {
                 angles: SideAngles::of(&document.skeleton),
                 how,
