@@ -231,6 +231,18 @@ fn a_drawing_needs_no_folder_of_its_own() {
 /// Every limb of a model comes to stand in the picture's plane: heights, and distances from where it
 /// leaves the trunk, stay.
 #[test]
+fn a_conifer_is_said_to_lose_its_axis() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let warning = "the example has one trunk up to the top";
+    let conifer = ["grow", "docs/sketches/conifer.svg", "--count", "1"];
+    assert!(done(&conifer, &dir.path().join("forks")).contains(warning));
+    let like = [&conifer[..], &["--like", "von-mises"]].concat();
+    assert!(!done(&like, &dir.path().join("angles")).contains(warning));
+    let tree = ["grow", DRAWING, "--count", "1"];
+    assert!(!done(&tree, &dir.path().join("tree")).contains(warning));
+}
+
+#[test]
 fn a_modelled_tree_is_made_flat_limb_by_limb() {
     let obj = "v 0 0 0\nv 0 10 0\nv 0 20 0\nv 3 14 4\nv 6 16 8\nv 3 18 4\nv -4 13 3\nv 1 25 0\n\
                v -1 24 0\nl 1 2 3 8\nl 3 9\nl 2 4 5\nl 4 6\nl 2 7\n";

@@ -107,6 +107,12 @@ pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
         config,
     };
     let parent = Parent::new(document, options)?;
+    if parent.loses_axis() {
+        eprint_line(
+            "warning: the example has one trunk up to the top; new trees of its forks do not keep it, \
+             --like von-mises does",
+        );
+    }
     let forest = args.forest.plan(&parent, args.count, args.seed)?;
     let is_stopped = stop.while_writing();
     let Some(forest) = forest else {

@@ -13,12 +13,14 @@ use crate::grow::{
 use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, grown_terms, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
-use crate::shape::Terms;
+use crate::shape::{Terms, is_trunk};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Poses of a loop in wind, Hz.
 const WIND_RATE_HZ: f64 = 30.0;
+/// A trunk that reaches this share of its tree's height is its axis.
+const AXIS_HEIGHT: f64 = 0.9;
 /// Trees that are grown to see how the terms of their push should weigh, and their seed.
 const SAMPLES: u64 = 5;
 const SAMPLE_SEED: u64 = 1;
@@ -187,6 +189,19 @@ impl Parent {
         bounds.map_or(Size::new(1, 1), |[left, top, right, bottom]| {
             Size::new(right - left + 1, bottom - top + 1)
         })
+    }
+
+    /// Whether new trees lack what the example is known by: one trunk up to the top, as conifers
+    /// have. Forks say how branches divide, not that one of them stays the axis.
+    pub fn loses_axis(&self) -> bool {
+        let skeleton = &self.document.skeleton;
+        let (mut trunk, mut all) = (0.0_f64, 0.0_f64);
+        for (node, is_trunk) in skeleton.nodes.iter().zip(is_trunk(skeleton)) {
+            let height = node.position.y;
+            all = all.max(height);
+            trunk = if is_trunk { trunk.max(height) } else { trunk };
+        }
+        matches!(self.form, Form::Forks { .. }) && trunk > AXIS_HEIGHT * all
     }
 
     /// Name of what was filmed, without the folders that it lay in.
