@@ -96,9 +96,10 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         .as_ref()
         .filter(|all| all.points.rms_px() >= NOISE_PX);
     let with_motions = tree.branches.get(trunk.index()).zip(decaying);
-    let fundamental = with_motions.and_then(|(trunk, motions)| {
-        fundamental(motions, film, trunk.base_px, onset, limits, cancel)
-    });
+    let fundamental = match with_motions {
+        Some((trunk, motions)) => fundamental(motions, film, trunk.base_px, onset, limits, cancel),
+        None => Err(Unidentified::NotMeasured),
+    };
     let mut estimator = FreeDecay {
         fundamental,
         trunk: *trunk,
@@ -127,8 +128,8 @@ struct ReleaseTime {
 
 struct FreeDecay<'a> {
     trunk: NodeId,
-    /// The trunk's sway, where all points at once show it.
-    fundamental: Option<Fundamental>,
+    /// The trunk's sway by all points at once.
+    fundamental: Result<Fundamental, Unidentified>,
     tree: &'a BranchTree,
     film: &'a Film,
     members: &'a [Vec<usize>],
@@ -177,10 +178,17 @@ impl FreeDecay<'_> {
 
     /// The trunk's sway: by its own points, where all points at once agree with it, are less sure, or
     /// show none. Its own points show it more exactly, but take modes close together for one; in all
-    /// points these differ in their shapes.
+    /// points these differ in their shapes. Where these show that too few periods were seen there is
+    /// no answer: its own points would have a limb's.
     fn or_fundamental(&mut self, trunk: &BranchInFilm, by_own_points: Swaying) -> Swaying {
-        let Some(found) = self.fundamental else {
-            return by_own_points;
+        let found = match self.fundamental {
+            Ok(found) => found,
+            Err(Unidentified::TooShort) => {
+                self.own[trunk.node.index()] = None;
+                self.trunk_is_known = false;
+                return Err(Unidentified::TooShort);
+            }
+            Err(_) => return by_own_points,
         };
         let mode = mode_of(found.mode.mode, &found.mode.ln_sd);
         let own = self.own[trunk.node.index()];
@@ -421,11 +429,18 @@ impl FreeDecay<'_> {
     }
 }
 
-/// Whether a tree may sway like a mode that was fitted to `signals`.
+/// Whether a tree may sway like a mode that was fitted to `signals`, and that is seen for long enough.
 pub(super) fn may_be_sway(signals: &Signals, mode: &Mode) -> bool {
-    mode.damping < MAX_DAMPING
-        && mode.frequency_hz * signals.span_s() >= MIN_PERIODS
-        && !signals.at_limit(mode)
+    oscillates(signals, mode) && mode.frequency_hz * signals.span_s() >= MIN_PERIODS
+}
+
+/// Whether a tree may sway like it, but is seen for too few periods.
+pub(super) fn is_too_brief(signals: &Signals, mode: &Mode) -> bool {
+    oscillates(signals, mode) && mode.frequency_hz * signals.span_s() < MIN_PERIODS
+}
+
+fn oscillates(signals: &Signals, mode: &Mode) -> bool {
+    mode.damping < MAX_DAMPING && !signals.at_limit(mode)
 }
 
 /// A mode with the standard deviations that are believed.

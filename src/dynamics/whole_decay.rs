@@ -10,7 +10,7 @@ use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::decay::Mode;
 use super::decaying_motions::DecayingMotions;
 use super::film::Film;
-use super::free_decay::may_be_sway;
+use super::free_decay::{is_too_brief, may_be_sway};
 use super::members::mean_px;
 use super::motions::{Motions, OF_SUBSPACE};
 use super::release::Onset;
@@ -18,6 +18,7 @@ use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
 use crate::cancel::CancelToken;
+use crate::model::Unidentified;
 use crate::signal::statistics::quantile;
 use nalgebra::{DVector, Point2};
 
@@ -37,9 +38,12 @@ pub(super) struct Fundamental {
     pub amplitude_deg: f64,
 }
 
-/// Of the motions since a release in `film`, of points which turn about `base_px`. `None` where there
-/// are too few points, where fewer than half of the numbers of modes have any that a tree may have,
-/// and where `cancel` ends the work before.
+/// Of the motions since a release in `film`, of points which turn about `base_px`.
+///
+/// # Errors
+/// By most numbers of modes a larger mode is seen for too few periods: a faster one would be taken for
+/// it. Or there are too few points, fewer than half of the numbers have a mode that
+/// a tree may have, or `cancel` ends the work before.
 pub(super) fn fundamental(
     decaying: &DecayingMotions,
     film: &Film,
@@ -47,15 +51,32 @@ pub(super) fn fundamental(
     onset: &Onset,
     limits: &SearchLimits,
     cancel: &CancelToken,
-) -> Option<Fundamental> {
+) -> Result<Fundamental, Unidentified> {
     let points = &decaying.points;
     if 2 * points.tracks.len() < OF_SUBSPACE {
-        return None;
+        return Err(Unidentified::NotMeasured);
     }
-    let found = asked(decaying, onset, limits, cancel)?;
+    let by_number = asked(decaying, onset, limits, cancel).ok_or(Unidentified::NotInTime)?;
+    let too_short = by_number.iter().filter(|f| f.is_too_short).count();
+    if 2 * too_short > MOST_MODES - LEAST_MODES {
+        return Err(Unidentified::TooShort);
+    }
+    let found: Vec<Found> = by_number.into_iter().filter_map(|f| f.sway).collect();
     if 2 * found.len() <= MOST_MODES - LEAST_MODES {
-        return None;
+        return Err(Unidentified::NoOscillation);
     }
+    central(found, decaying, film, base_px, onset).ok_or(Unidentified::NoOscillation)
+}
+
+/// The one of the middle, less sure by how far the others are from it.
+fn central(
+    found: Vec<Found>,
+    decaying: &DecayingMotions,
+    film: &Film,
+    base_px: Point2<f64>,
+    onset: &Onset,
+) -> Option<Fundamental> {
+    let points = &decaying.points;
     let frequencies: Vec<f64> = found.iter().map(|f| f.mode.frequency_hz.ln()).collect();
     let median = quantile(frequencies.clone(), 0.5)?;
     let distance = |ln_frequency: &f64| (ln_frequency - median).abs();
@@ -82,6 +103,14 @@ pub(super) fn fundamental(
     })
 }
 
+/// The larger modes of one number of modes.
+struct Asked {
+    /// The slowest that is seen for long enough.
+    sway: Option<Found>,
+    /// Whether one that is not is larger.
+    is_too_short: bool,
+}
+
 /// The fundamental by one number of modes.
 struct Found {
     mode: Mode,
@@ -90,13 +119,13 @@ struct Found {
     factors: Vec<Factor>,
 }
 
-/// The fundamental by each number of modes that has one.
+/// What each number of modes says.
 fn asked(
     decaying: &DecayingMotions,
     onset: &Onset,
     limits: &SearchLimits,
     cancel: &CancelToken,
-) -> Option<Vec<Found>> {
+) -> Option<Vec<Asked>> {
     let signals = decaying.signals(onset.at_s, onset.start, limits.frequencies_hz);
     let mut out = Vec::new();
     let mut fit = Fit::default();
@@ -109,33 +138,48 @@ fn asked(
         };
         fit = more;
         if modes >= LEAST_MODES {
-            out.extend(slowest(&signals, &fit));
+            out.push(slowest(decaying, &signals, &fit));
         }
     }
     Some(out)
 }
 
-/// The slowest of the larger modes of a fit that a tree may have.
-fn slowest(signals: &Signals, fit: &Fit) -> Option<Found> {
-    let spread = deviations(signals, fit, &vec![None; fit.modes.len()])?;
+/// Of the larger modes of a fit the slowest that is seen for long enough, and whether a mode that is
+/// not moves the points farther at first.
+fn slowest(decaying: &DecayingMotions, signals: &Signals, fit: &Fit) -> Asked {
     let factors = signals.factors(fit, OF_SUBSPACE);
-    let mut energies = Vec::with_capacity(fit.modes.len());
+    let mut energies = vec![0.0; fit.modes.len()];
+    let mut sizes = vec![0.0; fit.modes.len()];
     for (m, mode) in fit.modes.iter().enumerate() {
+        let scales = decaying.motions.scales();
+        let in_points = factors.iter().zip(scales).map(|(f, s)| f[m].size() * s);
+        sizes[m] = in_points.map(|size| size * size).sum();
         let squares: f64 = factors.iter().map(|f| f[m].size().powi(2)).sum();
         // A decay lasts as long as its damping is small.
-        let energy = squares / (mode.damping * mode.frequency_hz);
-        energies.push(if may_be_sway(signals, mode) {
-            energy
-        } else {
-            0.0
-        });
+        energies[m] = squares / (mode.damping * mode.frequency_hz);
     }
-    let least = MIN_ENERGY * energies.iter().copied().fold(0.0, f64::max);
-    let large = (0..energies.len()).filter(|m| energies[*m] > 0.0 && energies[*m] >= least);
-    let m = large.min_by(|a, b| {
+    let of = |wanted: fn(&Signals, &Mode) -> bool| {
+        let modes = fit.modes.iter().enumerate();
+        modes
+            .filter(move |(_, mode)| wanted(signals, mode))
+            .map(|(m, _)| m)
+    };
+    let largest = of(may_be_sway).map(|m| energies[m]).fold(0.0, f64::max);
+    let large = of(may_be_sway).filter(|m| energies[*m] >= MIN_ENERGY * largest);
+    let slowest = large.min_by(|a, b| {
         let [a, b] = [a, b].map(|m| fit.modes[*m].frequency_hz);
         a.total_cmp(&b)
-    })?;
+    });
+    let size = slowest.map_or(0.0, |m| sizes[m]);
+    Asked {
+        is_too_short: of(is_too_brief).any(|m| sizes[m] > size),
+        sway: slowest.and_then(|m| sway_of(signals, fit, &factors, m)),
+    }
+}
+
+/// Mode `m` of a fit with its deviations.
+fn sway_of(signals: &Signals, fit: &Fit, factors: &[Vec<Factor>], m: usize) -> Option<Found> {
+    let spread = deviations(signals, fit, &vec![None; fit.modes.len()])?;
     Some(Found {
         mode: fit.modes[m],
         ln_sd: LnDeviations::of_parameters(&spread[2 * m..]),
@@ -226,7 +270,7 @@ mod tests {
         },
     ];
 
-    fn found(film: &Film, cancel: &CancelToken) -> Option<Fundamental> {
+    fn found(film: &Film, cancel: &CancelToken) -> Result<Fundamental, Unidentified> {
         let onset = Onset {
             excitation: Excitation::Release,
             start: Start::Moving,
@@ -240,8 +284,9 @@ mod tests {
             max_relative_ci: 0.05,
         };
         let tracks: Vec<usize> = (0..film.tracks.len()).collect();
+        let motions = DecayingMotions::since(onset.from, film, &tracks);
         fundamental(
-            &DecayingMotions::since(onset.from, film, &tracks)?,
+            &motions.ok_or(Unidentified::NotMeasured)?,
             film,
             Point2::new(118.0, 200.0),
             &onset,
@@ -266,15 +311,23 @@ mod tests {
     #[test]
     fn what_says_nothing_has_none() {
         let still = found(&film([0.0; 3]), &CancelToken::new());
-        let is_sure = still.is_some_and(|f| f.mode.is_within(0.05));
+        let is_sure = still.as_ref().is_ok_and(|f| f.mode.is_within(0.05));
         assert!(!is_sure, "noise has none: {still:?}");
         let film = film([6.0, 8.0, 8.0]);
         let cancel = CancelToken::new();
         cancel.cancel();
-        assert!(found(&film, &cancel).is_none());
+        assert!(found(&film, &cancel).is_err());
         let short = film.part(0..40);
-        assert!(found(&short, &CancelToken::new()).is_none());
+        assert!(found(&short, &CancelToken::new()).is_err());
         let few = Film::new(&film.times_s, film.tracks[..2].to_vec());
-        assert!(found(&few, &CancelToken::new()).is_none());
+        assert!(found(&few, &CancelToken::new()).is_err());
+    }
+
+    /// 2.2 periods of the trunk's mode, and 2.6 of the limbs'.
+    #[test]
+    fn of_too_few_periods_there_is_none() {
+        let film = film([8.0, 5.0, 5.0]).part(0..132);
+        let found = found(&film, &CancelToken::new());
+        assert_eq!(found.err(), Some(Unidentified::TooShort));
     }
 }
