@@ -30,6 +30,8 @@ use nalgebra::Point2;
 
 /// Points of a branch and of its carrier that are needed.
 const MIN_POINTS: usize = 2;
+/// Points that are needed on a branch and all that it carries: two or three move alike by chance.
+const MIN_POINTS_IN_ALL: usize = 4;
 /// So many points that are on a branch and on none that it carries speak for it alone.
 const ENOUGH_OWN_POINTS: usize = 3;
 /// Ancestors that are kept.
@@ -164,7 +166,7 @@ impl InWind<'_> {
     fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let speaking = self.speaking(branch.node, branch.tracks);
         let points = Points::of(self.film, &speaking.tracks, 0);
-        if points.tracks.len() < MIN_POINTS {
+        if branch.tracks.len() < MIN_POINTS_IN_ALL || points.tracks.len() < MIN_POINTS {
             return Err(Unidentified::NotMeasured);
         }
         let of_carrier = self.speaking(branch.parent, &self.beside(branch));
