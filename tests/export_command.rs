@@ -525,7 +525,7 @@ const CASES: &[Case] = &[
     (
         "{w}/nothing --format glb --out {w}/t.glb",
         NO_INPUT,
-        &["is no capture"],
+        &["nothing is not there", "name"],
     ),
     (
         "recordings/README.md --format glb --out {w}/t.glb",

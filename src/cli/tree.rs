@@ -155,7 +155,12 @@ impl TreeArgs {
         if let Some(file) = &self.config {
             unused::note_film_settings(file, &note.config, &config);
         }
-        let length_s = tail.length_s(note.timing.duration_s, &config);
+        // What was not filmed is a loop of a minute at most.
+        let film_s = match note.timing.is_of_film() {
+            true => note.timing.duration_s,
+            false => f64::INFINITY,
+        };
+        let length_s = tail.length_s(film_s, &config);
         let document = Document::read(dir, length_s)?;
         let size = document.skeleton.image_size;
         self.shape.check_size(size)?;

@@ -7,6 +7,11 @@ use std::path::{Path, PathBuf};
 /// Each message is one line that says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum DocumentError {
+    #[error("{} is not there; check the name", .dir.display())]
+    NotThere { dir: PathBuf },
+    /// A folder that `grow` or another command has filled.
+    #[error("{} holds several trees; give the folder of one, such as {}", .dir.display(), .one.display())]
+    SeveralTrees { dir: PathBuf, one: PathBuf },
     #[error("{} is no capture: there is no capture.json in it; give a folder that `--out` has made", .dir.display())]
     NotACapture { dir: PathBuf },
     /// A table without which there is nothing to show.
@@ -35,6 +40,22 @@ pub enum DocumentError {
 }
 
 impl DocumentError {
+    /// What a path is at which there is no document, the file `note` of which every one has.
+    pub(super) fn no_document(path: &Path, note: &str) -> Self {
+        let dir = path.to_owned();
+        if !path.exists() {
+            return Self::NotThere { dir };
+        }
+        let inside = std::fs::read_dir(path).into_iter().flatten().flatten();
+        let trees = inside
+            .map(|entry| entry.path())
+            .filter(|one| one.join(note).is_file());
+        match trees.min() {
+            Some(one) => Self::SeveralTrees { dir, one },
+            None => Self::NotACapture { dir },
+        }
+    }
+
     pub(super) fn note(file: &Path, what: impl Into<String>) -> Self {
         Self::BadNote {
             file: file.to_owned(),

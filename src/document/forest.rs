@@ -101,9 +101,9 @@ impl ForestDocument {
     pub fn read(dir: &Path) -> Result<Self, DocumentError> {
         let file = dir.join(FOREST_FILE);
         let text = std::fs::read(&file).map_err(|source| match source.kind() {
-            ErrorKind::NotFound | ErrorKind::NotADirectory => DocumentError::NotACapture {
-                dir: dir.to_owned(),
-            },
+            ErrorKind::NotFound | ErrorKind::NotADirectory => {
+                DocumentError::no_document(dir, FOREST_FILE)
+            }
             _ => DocumentError::Unreadable {
                 file: file.clone(),
                 source,

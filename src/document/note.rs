@@ -299,9 +299,7 @@ pub(super) fn read(dir: &Path) -> Result<CaptureNote, DocumentError> {
     match std::fs::read(&file) {
         Ok(text) => parse(&file, &text),
         Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            Err(DocumentError::NotACapture {
-                dir: dir.to_owned(),
-            })
+            Err(DocumentError::no_document(dir, FILE))
         }
         Err(source) => Err(DocumentError::Unreadable { file, source }),
     }

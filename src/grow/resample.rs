@@ -35,10 +35,11 @@ impl Default for Resampling {
 }
 
 impl SideAngles {
-    /// Those of the branches of `skeleton` that move on their own and are no copies.
-    pub fn of(skeleton: &Skeleton) -> Self {
+    /// Those of the branches of `skeleton` that move on their own and are no copies. `trunk` says which
+    /// nodes are trunk: where it goes up to the top, its pieces are no branches.
+    pub fn of(skeleton: &Skeleton, trunk: &[bool]) -> Self {
         let (mut left, mut right) = (Vec::new(), Vec::new());
-        for branch in measured_branches(skeleton) {
+        for branch in measured_branches(skeleton).filter(|b| !trunk[b.node.index()]) {
             match deviation(skeleton, &branch) {
                 Some(angle) if angle >= 0.0 => left.push(angle),
                 Some(angle) => right.push(angle),
@@ -59,12 +60,13 @@ impl SideAngles {
 /// The measured nodes of `skeleton` with other angles between its branches: each branch from
 /// [`Resampling::from_level`] on is turned in the picture's plane about the place where it begins,
 /// with all that it carries, to an angle drawn for its side. What is below stays as it is to the
-/// last bit, and all lengths stay. There are no copies; depths are 0 and to be found anew.
+/// last bit, as does the trunk, and all lengths stay. There are no copies; depths are 0 and to be found anew.
 ///
 /// # Errors
 /// No angle of a side on which a branch is to be turned has a density above the threshold.
 pub fn resample(
     skeleton: &Skeleton,
+    trunk: &[bool],
     angles: &SideAngles,
     how: &Resampling,
     random: &mut Generator,
@@ -82,7 +84,10 @@ pub fn resample(
     let mut turns = vec![0.0; flat.nodes.len()];
     for branch in measured_branches(&flat) {
         let own = match deviation(&flat, &branch) {
-            Some(angle) if flat.nodes[branch.node.index()].level >= how.from_level => {
+            Some(angle)
+                if flat.nodes[branch.node.index()].level >= how.from_level
+                    && !trunk[branch.node.index()] =>
+            {
                 drawn_for(angles, angle, how, random)? - angle
             }
             _ => 0.0,
@@ -189,10 +194,21 @@ mod tests {
         from_level: 3,
     };
 
+    fn no_trunk(tree: &Skeleton) -> Vec<bool> {
+        vec![false; tree.nodes.len()]
+    }
+
     fn resampled(seed: u64) -> Skeleton {
         let tree = tree();
-        let angles = SideAngles::of(&tree);
-        resample(&tree, &angles, &HOW, &mut generator(seed, 0)).expect("dense enough")
+        let angles = SideAngles::of(&tree, &no_trunk(&tree));
+        resample(
+            &tree,
+            &no_trunk(&tree),
+            &angles,
+            &HOW,
+            &mut generator(seed, 0),
+        )
+        .expect("dense enough")
     }
 
     #[test]
@@ -215,10 +231,25 @@ mod tests {
         assert!(turned > tree.nodes.len() / 2, "{turned} nodes were turned");
     }
 
+    /// As of a conifer.
+    #[test]
+    fn a_trunk_up_to_the_top_stays() {
+        let tree = tree();
+        let trunk: Vec<bool> = tree.nodes.iter().map(|n| n.position.x == 0.0).collect();
+        let angles = SideAngles::of(&tree, &trunk);
+        let new = resample(&tree, &trunk, &angles, &HOW, &mut generator(1, 0)).expect("dense");
+        let mut turned = 0;
+        for ((old, new), is_trunk) in tree.nodes.iter().zip(&new.nodes).zip(&trunk) {
+            assert!(!is_trunk || old.position == new.position);
+            turned += usize::from(old.position != new.position);
+        }
+        assert!(turned > 20, "{turned} nodes were turned");
+    }
+
     #[test]
     fn branches_keep_their_side_and_their_angles_are_dense_enough() {
         let tree = tree();
-        let angles = SideAngles::of(&tree);
+        let angles = SideAngles::of(&tree, &no_trunk(&tree));
         let new = resampled(2);
         for branch in measured_branches(&new) {
             let before = deviation(&tree, &branch).unwrap_or(0.0);
@@ -243,18 +274,27 @@ mod tests {
     #[test]
     fn a_threshold_that_no_density_reaches_is_an_error() {
         let tree = tree();
-        let angles = SideAngles::of(&tree);
+        let angles = SideAngles::of(&tree, &no_trunk(&tree));
         let how = Resampling {
             threshold: 1e9,
             ..HOW
         };
-        assert!(resample(&tree, &angles, &how, &mut generator(1, 0)).is_err());
+        assert!(resample(&tree, &no_trunk(&tree), &angles, &how, &mut generator(1, 0)).is_err());
         // Where nothing is turned nothing is drawn.
         let none = Resampling {
             from_level: 99,
             ..how
         };
-        assert!(resample(&tree, &angles, &none, &mut generator(1, 0)).is_ok());
+        assert!(
+            resample(
+                &tree,
+                &no_trunk(&tree),
+                &angles,
+                &none,
+                &mut generator(1, 0)
+            )
+            .is_ok()
+        );
     }
 
     #[test]
@@ -263,8 +303,14 @@ mod tests {
             nodes: Vec::new(),
             ..tree()
         };
-        let angles = SideAngles::of(&nobody);
-        let same = resample(&nobody, &angles, &HOW, &mut generator(1, 0));
+        let angles = SideAngles::of(&nobody, &no_trunk(&nobody));
+        let same = resample(
+            &nobody,
+            &no_trunk(&nobody),
+            &angles,
+            &HOW,
+            &mut generator(1, 0),
+        );
         assert_eq!(same, Ok(nobody));
     }
 }

@@ -23,6 +23,12 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
         "ply" => ply::edges(bytes)?,
         "csv" => cylinders::edges(bytes)?,
         "txt" => treefile::edges(&String::from_utf8_lossy(bytes))?,
+        "mkv" | "avi" | "mp4" | "mcap" => {
+            return Err(ImportError::unsupported(
+                "it is a film",
+                "make a tree of it with `arborcam replay`, and give that",
+            ));
+        }
         _ => {
             return Err(ImportError::unsupported(
                 "its name does not say what it is",

@@ -77,6 +77,8 @@ enum Form {
     },
     Branches {
         angles: SideAngles,
+        /// Which nodes are trunk.
+        trunk: Vec<bool>,
         how: Resampling,
     },
 }
@@ -141,10 +143,14 @@ impl Parent {
         for_new_trees(&mut config.shape, &options.likeness);
         let form = match options.likeness {
             Likeness::Forks => Form::forks(&document.skeleton, &own, &config)?,
-            Likeness::Branches(how) => Form::Branches {
-                angles: SideAngles::of(&document.skeleton),
-                how,
-            },
+            Likeness::Branches(how) => {
+                let trunk = is_trunk(&document.skeleton);
+                Form::Branches {
+                    angles: SideAngles::of(&document.skeleton, &trunk),
+                    trunk,
+                    how,
+                }
+            }
         };
         let motion = match options.motion {
             OffspringMotion::Example => {
@@ -247,8 +253,8 @@ impl Parent {
                 let trunk_px = trunk_px * self.scale;
                 Ok(stand_grown(&flat, &self.region, *terms, trunk_px, config))
             }
-            Form::Branches { angles, how } => {
-                let turned = resample(example, angles, how, random).map_err(|nothing| {
+            Form::Branches { angles, trunk, how } => {
+                let turned = resample(example, trunk, angles, how, random).map_err(|nothing| {
                     PrepareError::NotDense {
                         threshold: how.threshold,
                         highest: nothing.highest,
