@@ -427,15 +427,15 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         (format!("cut.jpg {strokes}"), FAILED, "cut off"),
         (
             format!("photo.png {strokes} --frame 3"),
-            BAD_USAGE,
-            "1 frames",
+            NO_INPUT,
+            "single picture",
         ),
         (
             format!("none.mkv {strokes} --frame 3"),
             NO_INPUT,
             "none.mkv",
         ),
-        ("photo.png --tree bare.svg".into(), BAD_USAGE, "300x300"),
+        ("photo.png --tree bare.svg".into(), BAD_USAGE, "480x360"),
         (
             "photo.png --tree one.json --tree trunk.json".into(),
             BAD_USAGE,
