@@ -8,9 +8,10 @@
                                                what `cargo bench --bench wood` writes
     pictures.py drawing DRAWING.svg SIDE OUT.png
                                                a drawing of docs/sketches (paths of M, Q and L, polylines, lines), SIDE px
-    pictures.py photo PHOTO_DIR DOCUMENT HEIGHT OUT.png
-                                               a made photograph with its strokes (crown red, branch blue), the masks (leaves
-                                               green, wood brown), and the branches that were seen and those that were grown
+    pictures.py photo PICTURE STROKES DOCUMENTS HEIGHT OUT.png
+                                               a photograph with its strokes (crown red, branch blue), the masks (leaves green,
+                                               wood brown), and the branches that were seen and those that were grown; of one
+                                               tree or, with commas between the names, of several
     pictures.py triangles EXAMPLE TREES OUT.png
                                                the forks of an example and of the trees grown of it in the triangles of their
                                                angles and lengths, with the fitted Dirichlet densities (needs numpy, scipy)
@@ -250,32 +251,45 @@ def drawing(svg, side, out):
     picture.resize((int(side),) * 2, Image.LANCZOS).save(out)
 
 
-def photo(folder, document, height, out):
-    folder, document, height = Path(folder), Path(document), int(height)
-    picture = Image.open(folder / "photo.jpg").convert("RGB")
-    strokes = picture.copy()
-    draw = ImageDraw.Draw(strokes)
-    crown = [tuple(p) for p in json.loads((folder / "crown.json").read_text())["polygon_px"]]
-    trunk = [tuple(p) for p in json.loads((folder / "trunk.json").read_text())["polyline_px"]]
-    draw.line(crown + crown[:1], fill=(220, 40, 40), width=7, joint="curve")
-    draw.line(trunk, fill=(40, 80, 230), width=7, joint="curve")
+def photo(picture, strokes, trees, height, out):
+    """strokes and trees are lists of files and of documents, with commas between them."""
+    height, trees = int(height), [Path(tree) for tree in trees.split(",")]
+    picture = Image.open(picture).convert("RGB")
+    wide = max(3, picture.width // 200)
+    drawn = picture.copy()
+    draw = ImageDraw.Draw(drawn)
+    for name in filter(None, strokes.split(",")):
+        lines = json.loads(Path(name).read_text())
+        crown = lines.get("polygon_px", [])
+        polyline = lambda points, colour: draw.line([tuple(p) for p in points], fill=colour, width=wide, joint="curve")
+        if crown:
+            polyline(crown + crown[:1], (220, 40, 40))
+        for line in [lines] + lines.get("strokes", []):
+            if "polyline_px" in line:
+                polyline(line["polyline_px"], (40, 80, 230))
     masks = Image.new("RGB", picture.size, "white")
-    for name, colour in (("leaves.png", (60, 140, 60)), ("wood.png", (110, 75, 45))):
-        mask = Image.open(document / name).convert("L").point(lambda level: 255 * (level > 127))
-        masks.paste(colour, (0, 0), mask)
     branches = Image.new("RGB", picture.size, "white")
     draw = ImageDraw.Draw(branches)
+    for tree in trees:
+        for name, colour in (("leaves.png", (60, 140, 60)), ("wood.png", (110, 75, 45))):
+            mask = Image.open(tree / name).convert("L").point(lambda level: 255 * (level > 127))
+            masks.paste(colour, (0, 0), mask)
+        draw_branches(draw, tree)
+    width = round(height * (9 / 8 if len(trees) == 1 else picture.width / picture.height))
+    row = Image.new("RGB", (3 * width, height), "white")
+    for k, part in enumerate((drawn, masks, branches)):
+        row.paste(ImageOps.fit(part, (width, height), Image.LANCZOS), (k * width, 0))
+    row.save(out)
+
+
+def draw_branches(draw, document):
+    """Those that were seen over those that were grown."""
     colours = {"traced": (110, 75, 45), "grown": (230, 150, 40)}
     nodes = {n["node_id"]: n for n in rows(document / "nodes.csv")}
     for node in sorted(nodes.values(), key=lambda n: n["kind"] == "traced"):
         if node["parent_id"]:
             ends = [(float(n["u_px"]), float(n["v_px"])) for n in (node, nodes[node["parent_id"]])]
             draw.line(ends, fill=colours[node["kind"]], width=max(3, round(2 * float(node["radius"]))))
-    width = height * 9 // 8
-    row = Image.new("RGB", (3 * width, height), "white")
-    for k, part in enumerate((strokes, masks, branches)):
-        row.paste(ImageOps.fit(part, (width, height), Image.LANCZOS), (k * width, 0))
-    row.save(out)
 
 
 def draw_strokes(draw, element, scale, width):
@@ -382,7 +396,7 @@ def dirichlet(shares):
 if __name__ == "__main__":
     commands = {
         "terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5), "drawing": (drawing, 3),
-        "photo": (photo, 4), "triangles": (triangles, 3),
+        "photo": (photo, 5), "triangles": (triangles, 3),
     }
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:

@@ -175,24 +175,109 @@ sketch() {
     row "$to/sketch-conifer.png" "$work/drawing-conifer.png" "$work"/made-drawn-conifer{,-side}.png
 }
 
-# A bare tree and one in leaf, each from a photograph with two strokes.
+# photographed NAME OPTIONS...: what `arborcam photo` makes, below $work.
+photographed() {
+    local name=$1
+    shift
+    "$arborcam" photo "$@" --out "$work/$name" 2>"$work/photo.log" || fail "photo of $name failed: $(tail -n 1 "$work/photo.log")"
+}
+
+# made_photo NAME SEED bare|leaves OPTIONS...: a made photograph below $work.
+made_photo() {
+    local name=$1
+    shift
+    "$python" benches/made_photos.py "$work" "$name" "$@" ||
+        fail "no photograph could be made; see the head of benches/made_photos.py for what PYTHON needs"
+}
+
+# seen NAME VIEW [SIZE]: draws a photographed tree or wood to seen-NAME-VIEW.png.
+seen() {
+    rm -f "$work/seen-$1-$2.png"
+    "$arborcam" render "$work/$1" --size "${3:-256x256}" --view "$2" --out "$work/seen-$1-$2.png" 2>"$work/render.log" ||
+        fail "render of $1 failed: $(cat "$work/render.log")"
+}
+
+# photo_sheet OUT NAME PICTURE STROKES: photograph, masks, branches, front and side of one tree.
+photo_sheet() {
+    "$python" scripts/pictures.py photo "$3" "$4" "$work/$2" 256 "$work/strokes-$2.png"
+    seen "$2" front
+    seen "$2" side
+    row "$1" "$work"/{strokes-$2,seen-$2-front,seen-$2-side}.png
+}
+
+# Trees of photographs: one bare, one in leaf, one with and without attractors in space, several in one picture, frames of the clips,
+# and one that sways like a captured one.
 photo() {
-    local seed look made
-    for seed in 32005 32002; do
+    local seed look made tree folders files k
+    for seed in 32005 32002 32008 32009; do
         look=bare
         ((seed % 2)) || look=leaves
         made=$work/photo-$seed
-        "$python" benches/made_photos.py "$work" "photo-$seed" "$seed" "$look" ||
-            fail "no photograph could be made; see the head of benches/made_photos.py for what PYTHON needs"
-        "$arborcam" photo "$made/photo.jpg" --crown "$made/crown.json" --branch "$made/trunk.json" --out "$work/seen-$seed" \
-            2>"$work/photo.log" || fail "photo of $seed failed: $(tail -n 1 "$work/photo.log")"
-        "$python" scripts/pictures.py photo "$made" "$work/seen-$seed" 256 "$work/strokes-$seed.png"
-        for view in front side; do
-            "$arborcam" render "$work/seen-$seed" --size 256x256 --view "$view" --out "$work/seen-$seed-$view.png" \
-                2>"$work/render.log" || fail "render of $seed failed: $(cat "$work/render.log")"
-        done
-        row "$to/photo-$look.png" "$work"/{strokes-$seed,seen-$seed-front,seen-$seed-side}.png
+        made_photo "photo-$seed" "$seed" "$look"
+        photographed "of-$seed" "$made/photo.jpg" --crown "$made/crown.json" --branch "$made/trunk.json"
+        photo_sheet "$work/sheet-$seed.png" "of-$seed" "$made/photo.jpg" "$made/crown.json,$made/trunk.json"
     done
+    cp "$work/sheet-32005.png" "$to/photo-bare.png"
+    cp "$work/sheet-32002.png" "$to/photo-leaves.png"
+    column "$to/photo-four.png" "$work"/sheet-{32002,32005,32008,32009}.png
+    made=$work/photo-32002
+    photographed in-picture "$made/photo.jpg" --crown "$made/crown.json" --branch "$made/trunk.json" --attractors picture
+    for tree in in-picture of-32002; do seen "$tree" side; done
+    row "$to/photo-space.png" "$work"/seen-{of-32002-front,in-picture-side,of-32002-side}.png
+    for look in leaves bare; do
+        made=$work/wood-$look seed=36001
+        [[ $look == leaves ]] || seed=36003
+        made_photo "wood-$look" "$seed" "$look" --trees 4
+        files=() folders=
+        for k in 1 2 3 4; do files+=(--tree "$made/tree-$k.json"); done
+        photographed "scene-$look" "$made/photo.jpg" "${files[@]}" --horizon 591
+        for k in 1 2 3 4; do folders+=${folders:+,}$work/scene-$look/tree-000$k; done
+        "$python" scripts/pictures.py photo "$made/photo.jpg" "$(printf '%s,' "$made"/tree-?.json)" "$folders" 224 "$work/strokes-$look.png"
+        seen "scene-$look" front 600x320
+        seen "scene-$look" turntable 594x320
+        row "$work/views-$look.png" "$work"/seen-scene-$look-{front,turntable}.png
+        column "$to/photo-wood-$look.png" "$work/strokes-$look.png" "$work/views-$look.png"
+    done
+    for tree in "${trees[@]}"; do
+        photographed "clip-$tree" "${film[$tree]}" --frame 0 --crown "${outline[$tree]}" --branch "docs/sketches/$tree-trunk.json"
+        photo_sheet "$to/photo-clip-$tree.png" "clip-$tree" "$work/clip-$tree/frame.jpg" "${outline[$tree]},docs/sketches/$tree-trunk.json"
+    done
+    sway_beside
+}
+
+# The captured winter tree, and a photographed one like it, in the same wind.
+sway_beside() {
+    local made=$work/photo-32005 tree
+    capture winter
+    photographed like-winter "$made/photo.jpg" --crown "$made/crown.json" --branch "$made/trunk.json" --like "$work/winter"
+    for tree in winter like-winter; do
+        "$arborcam" animate "$work/$tree" --wind 7 --seconds 3 --loop --size 176x176 --out "$work/$tree.mp4" 2>"$work/animate.log" ||
+            fail "animate of $tree failed: $(tail -n 1 "$work/animate.log")"
+    done
+    ffmpeg -v error -nostdin -y -i "$work/winter.mp4" -i "$work/like-winter.mp4" -filter_complex \
+        "hstack=inputs=2,fps=6,split[a][b];[a]palettegen=max_colors=8[p];[b][p]paletteuse=dither=none" "$to/photo-sway.gif"
+    told "$to/photo-sway.gif"
+}
+
+# column OUT PICTURES...: one below the other, as wide as the first.
+column() {
+    local out=$1 inputs=() scaled= n=0 width picture
+    shift
+    width=$(ffprobe -v error -show_entries stream=width -of csv=p=0 "$1")
+    for picture in "$@"; do
+        inputs+=(-i "$picture")
+        scaled+="[$n]scale=$width:-2[s$n];"
+        n=$((n + 1))
+    done
+    for k in $(seq 0 $((n - 1))); do scaled+="[s$k]"; done
+    local colours
+    for colours in 256 96 48 24 12; do
+        ffmpeg -v error -nostdin -y "${inputs[@]}" -filter_complex \
+            "${scaled}vstack=inputs=$n,split[a][b];[a]palettegen=max_colors=$colours:reserve_transparent=0[p];[b][p]paletteuse=dither=none" \
+            -frames:v 1 "$out"
+        (($(stat -c %s "$out") <= largest)) && break
+    done
+    told "$out"
 }
 
 # Forty trees of eight on a hill.

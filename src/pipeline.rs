@@ -19,6 +19,8 @@ mod film_log;
 mod front;
 mod grown;
 mod leaves;
+#[cfg(feature = "opencv")]
+mod photograph;
 mod pose_tracker;
 mod refiner;
 mod reshape;
@@ -38,6 +40,8 @@ pub use film_log::{FilmLog, KeptFrame};
 #[cfg(feature = "opencv")]
 pub use front::FrontEnd;
 pub use grown::stand_grown;
+#[cfg(feature = "opencv")]
+pub use photograph::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, grown_terms, reshape};

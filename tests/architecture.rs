@@ -83,6 +83,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "solve",
             "wood",
             "random",
+            // The branches that a photograph shows become a flat tree as drawn ones do.
+            "import",
         ],
     ),
     ("recording", &["model"]),

@@ -373,6 +373,48 @@ fn a_drawn_density_goes_before_the_picture_s() {
     assert!(left > 20.0 * right, "{left} {right}");
 }
 
+/// The same density as a mask of single leaves, and as a drawn one.
+#[test]
+fn beside_the_leaves_of_a_photograph_there_are_hardly_any() {
+    let still = still(true);
+    // Stripes as wide as leaves.
+    let is_leaf = |i: usize| (i % 640) % 24 < 14 && i / 640 < 250;
+    let pixels = (0..SIZE.area()).map(|i| if is_leaf(i) { 255 } else { 0 });
+    let mask = Luma {
+        size: SIZE,
+        pixels: pixels.collect(),
+    };
+    let beside = |seen: Seen| {
+        let leaves = dress(&still.skeleton, seen, &Config::default()).foliage;
+        let (covered, width) = leaf_cover(&leaves, &still.skeleton, None);
+        assert_eq!(width, 640);
+        let (mut beside, mut all) = (0.0, 0.0);
+        for (i, c) in covered.iter().enumerate() {
+            all += c;
+            beside += if is_leaf(i) { 0.0 } else { *c };
+        }
+        assert!(all > 500.0, "{all}");
+        beside / all
+    };
+    let seen = Seen {
+        picture: Some(&still.picture),
+        outline: Some(&still.outline),
+        ..Seen::default()
+    };
+    let drawn = beside(Seen {
+        density: Some(&mask),
+        ..seen
+    });
+    let of_photograph = beside(Seen {
+        leaf_mask: Some(&mask),
+        ..seen
+    });
+    assert!(
+        of_photograph < 0.6 * drawn,
+        "{of_photograph} instead of {drawn}"
+    );
+}
+
 #[test]
 fn the_same_picture_gives_the_same_leaves() {
     let still = still(true);

@@ -2,7 +2,7 @@
 
 mod support;
 
-use arborcam::document::Document;
+use arborcam::document::{Document, ForestDocument};
 use arborcam::model::{NodeKind, Skeleton};
 use arborcam::signal::distance_to_segment;
 use image::{DynamicImage, Rgb, RgbImage};
@@ -234,6 +234,100 @@ fn strokes_are_in_the_pixels_of_a_large_photograph() {
     assert!((foot - Point2::from(FOOT)).norm() < 4.0, "{foot}");
 }
 
+/// Crown and trunk in one file, so far to the right.
+fn sketch(right_px: f64) -> String {
+    let corners: Vec<[f64; 2]> = serde_json::from_str(CROWN).expect("corners");
+    let moved = |line: &[[f64; 2]]| -> Vec<[f64; 2]> {
+        line.iter().map(|[u, v]| [u + right_px, *v]).collect()
+    };
+    let (crown, trunk) = (moved(&corners), moved(&[FOOT, FORK, ENDS[0]]));
+    format!(
+        r#"{{"width": 480, "height": 360, "polygon_px": {crown:?}, "strokes": [{{"polyline_px": {trunk:?}}}]}}"#
+    )
+}
+
+#[test]
+fn several_trees_of_one_photograph_stand_in_one_scene() {
+    let one = photograph(true);
+    let mut both = RgbImage::new(2 * WIDTH, HEIGHT);
+    image::imageops::replace(&mut both, &one, 0, 0);
+    // The right one stands farther away: its foot is higher in the picture.
+    image::imageops::replace(&mut both, &one, i64::from(WIDTH), 0);
+    let raised = image::imageops::crop_imm(&one, 0, 30, WIDTH, HEIGHT - 30).to_image();
+    image::imageops::replace(&mut both, &raised, i64::from(WIDTH), 0);
+    let scene = Scene::new(both);
+    let wide = |text: String| text.replace(r#""width": 480"#, r#""width": 960"#);
+    scene.write("left.json", &wide(sketch(0.0)));
+    let right = wide(sketch(480.0));
+    let mut right: serde_json::Value = serde_json::from_str(&right).expect("json");
+    let up = |line: &mut serde_json::Value| {
+        for at in line.as_array_mut().expect("a line") {
+            at[1] = (at[1].as_f64().expect("a number") - 30.0).max(0.0).into();
+        }
+    };
+    up(&mut right["polygon_px"]);
+    up(&mut right["strokes"][0]["polyline_px"]);
+    scene.write("right.json", &right.to_string());
+    let trees = "photo.png --tree left.json --tree right.json --horizon 270";
+    let output = scene.photo(trees, "wood");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let wood = scene.path("wood");
+    let names = names_in(&wood);
+    for name in [
+        "tree-0001",
+        "tree-0002",
+        "forest.csv",
+        "forest.json",
+        "forest.glb",
+    ] {
+        assert!(names.iter().any(|n| n == name), "{names:?}");
+    }
+    let forest = ForestDocument::read(&wood).expect("a forest").forest;
+    let [left, right] = &forest.trees[..] else {
+        panic!("{forest:?}");
+    };
+    // 60 rows below the horizon, and 30.
+    assert!((left.scale - 1.0).abs() < 1e-9);
+    assert!((right.scale - 2.0).abs() < 0.2, "{}", right.scale);
+    assert!(left.foot.x < right.foot.x && left.foot.z > right.foot.z);
+    for name in ["tree-0001", "tree-0002"] {
+        let tree = Document::read(&wood.join(name), 1.0).expect("a document");
+        assert!(count(&tree.skeleton, NodeKind::Grown) > 10);
+    }
+    let dir = wood.to_str().expect("path");
+    run(&["render", dir, "--out"], &scene.path("wood.png"));
+}
+
+#[test]
+fn a_frame_of_a_film_is_a_photograph() {
+    let Some(film) = fs::canonicalize(support::CLIP).ok() else {
+        panic!("{} is missing", support::CLIP);
+    };
+    let outline = fs::canonicalize(support::OUTLINE).expect("outline");
+    let scene = Scene::new(photograph(true));
+    let trunk = fs::canonicalize("docs/sketches/winter-trunk.json").expect("trunk");
+    let arguments = format!(
+        "{} --frame 3 --crown {} --branch {}",
+        film.display(),
+        outline.display(),
+        trunk.display()
+    );
+    let output = scene.photo(&arguments, "tree");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let tree = Document::read(&scene.path("tree"), 1.0).expect("a document");
+    assert!(tree.skeleton.nodes.len() > 5, "{:?}", tree.skeleton.nodes);
+    let picture = tree.note.picture.expect("a picture");
+    assert_eq!(picture.frame, 3);
+    assert!((picture.time_s - 0.1).abs() < 0.01, "{}", picture.time_s);
+    let beyond = arguments.replace("--frame 3", "--frame 99999");
+    let output = scene.photo(&beyond, "beyond");
+    assert_eq!(output.status.code(), Some(BAD_USAGE));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("frames, counted from 0"), "{said}");
+}
+
 impl Scene {
     /// The tree with a crown stroke for a photograph of this width.
     fn tree_with_crown(&self, width: u32) -> (Document, String) {
@@ -270,6 +364,13 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
     RgbImage::from_pixel(WIDTH, HEIGHT, Rgb([160, 180, 210]))
         .save(scene.path("sky.png"))
         .expect("png");
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    DynamicImage::from(photograph(true))
+        .write_to(&mut jpeg, image::ImageFormat::Jpeg)
+        .expect("jpeg");
+    let jpeg = jpeg.into_inner();
+    fs::write(scene.path("cut.jpg"), &jpeg[..2 * jpeg.len() / 3]).expect("write");
+    scene.write("one.json", &sketch(0.0));
     let line = |text: &str| format!(r#"{{"width": 480, "height": 360, "polyline_px": {text}}}"#);
     let crown = |text: &str| format!(r#"{{"width": 480, "height": 360, "polygon_px": {text}}}"#);
     scene.write("off.json", &line("[[240, 330], [240, 900]]"));
@@ -305,7 +406,7 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         (
             "photo.png --crown flat.json --branch trunk.json".into(),
             BAD_USAGE,
-            "--crown",
+            "crown stroke",
         ),
         (
             "photo.png --crown two.json --branch trunk.json".into(),
@@ -323,10 +424,45 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
             "branches",
         ),
         (format!("photo.png {strokes} --like none"), NO_INPUT, "none"),
+        (format!("cut.jpg {strokes}"), FAILED, "cut off"),
+        (
+            format!("photo.png {strokes} --frame 3"),
+            NO_INPUT,
+            "single picture",
+        ),
+        (
+            format!("none.mkv {strokes} --frame 3"),
+            NO_INPUT,
+            "none.mkv",
+        ),
+        ("photo.png --tree bare.svg".into(), BAD_USAGE, "480x360"),
+        (
+            "photo.png --tree one.json --tree trunk.json".into(),
+            BAD_USAGE,
+            "trunk.json: each of several trees",
+        ),
+        (
+            "photo.png --tree one.json --tree one.json --horizon 350".into(),
+            BAD_USAGE,
+            "--horizon",
+        ),
+        (
+            "photo.png --tree one.json --tree off.json".into(),
+            BAD_USAGE,
+            "outside",
+        ),
+        (
+            format!("photo.png {strokes} --draw"),
+            BAD_USAGE,
+            "no terminal",
+        ),
     ] {
         let output = scene.photo(&arguments, "out");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        let lines: Vec<&str> = said.lines().filter(|l| !l.contains("note:")).collect();
+        // Files are read with the arguments, and such errors have the form of the argument parser's.
+        let is_more =
+            |l: &&str| l.is_empty() || l.contains("note:") || l.contains("For more information");
+        let lines: Vec<&str> = said.lines().filter(|l| !is_more(l)).collect();
         assert_eq!(output.status.code(), Some(status), "{arguments}: {said}");
         assert!(
             lines.len() == 1 && lines[0].contains(expected),

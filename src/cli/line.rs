@@ -45,13 +45,15 @@ impl Line {
         if self.size() == size {
             return Ok(());
         }
-        Err(CommandError::BadUsage(anyhow!(
-            "{option} is for a picture of {}x{}, this one is {size}; draw it on a frame of this \
-             clip",
-            self.width,
-            self.height
-        )))
+        Err(of_another_picture(option, self.size(), size))
     }
+}
+
+/// What was given to `option` was drawn in a picture of another size than `own`.
+pub fn of_another_picture(option: &str, drawn_in: Size, own: Size) -> CommandError {
+    CommandError::BadUsage(anyhow!(
+        "{option} is for a picture of {drawn_in}, this one is {own}; draw it on this one"
+    ))
 }
 
 /// The lines of one file.

@@ -1,52 +1,43 @@
-//! `arborcam photo PICTURE --out DIR`: a tree from one photograph.
+//! `arborcam photo PICTURE --out DIR`: trees from one photograph, or from one frame of a film.
+
+mod draw;
+mod drawn;
+mod picture;
 
 use super::command_error::CommandError;
 use super::example::Example;
-use super::line::Lines;
+use super::forest::write_forest;
+use super::grow::tree_name;
 use super::output::eprint_line;
 use super::stop::Stop;
 use crate::cancel::CancelToken;
-use crate::config::Config;
-use crate::files::{read_bounded, refuse_taken};
-use crate::grow::{Library, SubtreeKind};
-use crate::import::{Crown, read_crown, traced};
-use crate::model::{Foot, FootBasis, Outline, Size};
-use crate::outline::{self, OutlineError};
-use crate::source::Photograph;
-use crate::views::{PhotoDepth, PhotoGrowth, PhotoParts, PhotoTree, photo_defaults};
-use crate::wood::{self, LeafColour, SeenInPhotograph, Stroke};
-use anyhow::{Context, anyhow};
+use crate::files::refuse_taken;
+use crate::grow::SubtreeKind;
+use crate::model::TreeStrokes;
+use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
+use crate::views::{
+    Attracting, ForestPlan, PhotoDepth, PhotoExample, PhotoGrowth, PhotoParts, PhotoTree,
+    PhotoTreeError, StandingPlaces, photo_defaults, photo_forest,
+};
+use crate::wood::LeafColour;
+use anyhow::anyhow;
 use clap::{Args, ValueEnum};
+use drawn::{DrawnTree, StrokeFiles};
 use nalgebra::Point2;
+use picture::{PictureArgs, ShownPicture};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::Ordering;
-
-/// Largest photograph, and largest file of a stroke, that is read, bytes.
-const LARGEST: u64 = 256_000_000;
-
-/// Gaps between leaves up to this share of the photograph's width are closed; up to the second where one
-/// piece then has nearly all.
-const CLOSE_SHARE: f64 = 0.008;
-const CLOSE_MOST: f64 = 0.06;
-const NEARLY_ALL: f64 = 0.93;
-/// Without a stroke the trunk is looked for up to this share of the tree's height, and has so many
-/// rows at least.
-const TRUNK_SHARE: f64 = 0.3;
-const LEAST_TRUNK_ROWS: usize = 12;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 #[derive(Debug, Args)]
 pub struct PhotoArgs {
-    /// The photograph (.png, .jpg, .bmp).
-    picture: PathBuf,
-    /// A closed line round the crown, in the pixels of the photograph: JSON (width, height,
-    /// polygon_px), or SVG.
-    #[arg(long, value_name = "FILE", value_parser = parse_crown)]
-    crown: Option<Crown>,
-    /// A line along a branch from its base to its tip, the trunk's first: JSON (width, height,
-    /// polyline_px), or a drawing as for `sketch` (SVG, JSON). May be given several times.
-    #[arg(long = "branch", value_name = "FILE", value_parser = Lines::read)]
-    branches: Vec<Lines>,
+    #[command(flatten)]
+    picture: PictureArgs,
+    #[command(flatten)]
+    strokes: StrokeFiles,
+    /// Draw crown and branches on the picture in the terminal, and see what is found after every
+    /// stroke; what is given by files is there already.
+    #[arg(long)]
+    draw: bool,
     /// The colour by which leaves are known.
     #[arg(long, value_name = "COLOUR", default_value = "green")]
     foliage: Foliage,
@@ -60,13 +51,22 @@ pub struct PhotoArgs {
     /// How the branches that are seen come into space.
     #[arg(long, value_name = "HOW", default_value = "push")]
     depth: Depth,
+    /// What draws the branches that are grown: the leaves in the picture alone, or in turns with what
+    /// makes the tree as deep as it is wide.
+    #[arg(long, value_name = "WHERE", default_value = "space")]
+    attractors: Attractors,
+    /// The row of the horizon, px of the photograph, by which trees that stand farther away are
+    /// larger than they look; of several trees only. By default the middle row.
+    #[arg(long, value_name = "ROW")]
+    horizon: Option<f64>,
     /// Seed of the random numbers; the same seed gives the same tree.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u32,
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Folder for the tree. It must not exist, and appears when it is complete.
+    /// Folder for the tree, or for several trees and their scene. It must not exist, and appears when
+    /// it is complete.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -106,6 +106,23 @@ enum Depth {
     Apart,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Attractors {
+    /// In the picture and in space.
+    Space,
+    /// In the picture alone.
+    Picture,
+}
+
+impl From<Attractors> for Attracting {
+    fn from(attractors: Attractors) -> Self {
+        match attractors {
+            Attractors::Space => Self::Space,
+            Attractors::Picture => Self::Picture,
+        }
+    }
+}
+
 impl From<Depth> for PhotoDepth {
     fn from(depth: Depth) -> Self {
         match depth {
@@ -126,273 +143,173 @@ impl From<Foliage> for LeafColour {
     }
 }
 
-/// Parses `--crown`.
-fn parse_crown(path: &str) -> Result<Crown, String> {
-    let bytes = read_bounded(Path::new(path), LARGEST).map_err(|e| format!("{e}; give a file"))?;
-    read_crown(&bytes).map_err(|e| e.to_string())
-}
-
 pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     refuse_taken(&args.out)?;
-    let stop = Stop::on_signals()?;
     let config = photo_defaults().layered(args.config.as_deref(), |config| {
         (config.wood.seed, config.wind.seed) = (args.seed, args.seed);
     })?;
-    let photo = args.read_picture()?;
+    let shown = args.picture.read(&config.camera)?;
+    let mut drawn = args.strokes.on(&shown)?;
+    let options = PhotoOptions {
+        leaf_colour: args.foliage.into(),
+        trace_by: config.skeleton.trace_by,
+    };
+    if args.draw {
+        drawn = draw::on_screen(&shown, drawn, options)?;
+    }
+    let stop = Stop::on_signals()?;
     let like = args.like()?;
-    let drawn = args.drawn(&photo)?;
-    let seen = args.seen(&photo, &drawn, &config)?;
-    let mut tree = args.stood_up(&photo, &drawn, &seen, like.as_ref(), config)?;
-    tree.tree.note.warnings.extend(drawn.found);
+    let seen = seen(&shown, &drawn, options)?;
+    let growth = PhotoGrowth {
+        subtrees: args.subtrees.into(),
+        like: like.as_ref(),
+        depth: args.depth.into(),
+        attractors: args.attractors.into(),
+    };
+    let mut trees = Vec::with_capacity(seen.len());
+    for (tree, own) in seen.iter().zip(&drawn) {
+        let parts = PhotoParts {
+            name: &shown.name,
+            picture: &shown.picture,
+            tree,
+        };
+        let new = PhotoTree::new(parts, growth, config.clone());
+        let mut new = new.map_err(|e| failure(&shown, own, e))?;
+        new.tree.note.warnings.extend(found_note(tree));
+        trees.push(new);
+    }
+    let forest = match trees.len() {
+        1 => None,
+        _ => Some(args.forest(&shown, &trees)?),
+    };
+    let is_stopped = stop.while_writing();
+    match forest {
+        None => write_single(&args.out, trees, is_stopped),
+        Some(forest) => write_all(&args.out, trees, forest, is_stopped),
+    }
+}
+
+impl PhotoArgs {
+    /// The tree of `--like`.
+    fn like(&self) -> Result<Option<PhotoExample>, CommandError> {
+        let Some(path) = &self.like else {
+            return Ok(None);
+        };
+        let example = PhotoExample::of(Example::read(path, None)?.document);
+        example.map(Some).ok_or_else(|| {
+            CommandError::BadUsage(anyhow!(
+                "--like {}: it has no branches that bear others; give another tree",
+                path.display()
+            ))
+        })
+    }
+
+    /// Where several trees stand in one scene.
+    fn forest(
+        &self,
+        shown: &ShownPicture,
+        trees: &[PhotoTree],
+    ) -> Result<ForestPlan, CommandError> {
+        let feet = trees.iter().map(|tree| tree.tree.skeleton.foot_px);
+        let feet_px: Vec<Point2<f64>> = feet.collect();
+        let horizon_px = self.horizon.map(|row| row * shown.scale());
+        let size = shown.picture.rgb.size;
+        let places = StandingPlaces::of(&feet_px, size, horizon_px).ok_or_else(|| {
+            CommandError::BadUsage(anyhow!(
+                "--horizon: the foot of a tree is not below that row; give a row above all feet"
+            ))
+        })?;
+        Ok(photo_forest(&shown.name, trees, &places, tree_name))
+    }
+}
+
+/// What the photograph shows of every tree that is drawn on it.
+fn seen(
+    shown: &ShownPicture,
+    drawn: &[DrawnTree],
+    options: PhotoOptions,
+) -> Result<Vec<TreeInPhoto>, CommandError> {
+    let mut seen = Vec::with_capacity(drawn.len());
+    for own in drawn {
+        let tree = see_tree(
+            &shown.picture.rgb,
+            &own.strokes,
+            options,
+            &CancelToken::new(),
+        );
+        let tree = tree.map_err(|e| failure(shown, own, e.into()))?;
+        if let Some(note) = found_note(&tree) {
+            eprint_line(&format!("arborcam: note: {note}"));
+        }
+        seen.push(tree);
+    }
+    Ok(seen)
+}
+
+/// What is said of a tree that was found without strokes, and how sure that is.
+fn found_note(tree: &TreeInPhoto) -> Option<String> {
+    let agreement = 100.0 * tree.agreement?;
+    Some(format!(
+        "the tree was found without strokes: two attempts agree by {agreement:.0} %; if it is wrong, draw --crown \
+         and --branch"
+    ))
+}
+
+/// The error of a tree that is drawn so: of the file with its strokes, or else of the photograph.
+fn failure(shown: &ShownPicture, drawn: &DrawnTree, e: PhotoTreeError) -> CommandError {
+    let place = drawn.file.as_ref().unwrap_or(&shown.name);
+    match e {
+        PhotoTreeError::Photo(e) if e.is_of_strokes() => {
+            CommandError::BadUsage(anyhow!("{place}: {e}"))
+        }
+        PhotoTreeError::Photo(PhotoError::Cancelled) => CommandError::Stopped,
+        PhotoTreeError::Photo(e) => CommandError::Failed(anyhow!("{place}: {e}")),
+        PhotoTreeError::Prepare(e) => e.into(),
+    }
+}
+
+/// Writes one tree, and says of what it is made.
+fn write_tree(tree: PhotoTree, dir: &Path, is_stopped: &AtomicBool) -> Result<(), CommandError> {
     let all = tree.tree.skeleton.measured_branches().count();
     let grown = tree.growth.branches;
-    if stop.while_writing().load(Ordering::SeqCst) {
+    if is_stopped.load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
-    tree.write(&args.out)?;
-    let shown = args.out.display();
+    tree.write(dir)?;
     eprint_line(&format!(
-        "{shown}: a tree of {all} branches: {} seen, {grown} grown",
+        "{}: a tree of {all} branches: {} seen, {grown} grown",
+        dir.display(),
         all - grown.min(all)
     ));
     Ok(())
 }
 
-/// What is looked for in the photograph.
-struct Drawn {
-    crown: Outline,
-    /// The trunk's first.
-    strokes: Vec<Stroke>,
-    /// What was found without strokes, and how sure that is.
-    found: Option<String>,
+fn write_single(
+    out: &Path,
+    trees: Vec<PhotoTree>,
+    is_stopped: &AtomicBool,
+) -> Result<(), CommandError> {
+    let mut trees = trees.into_iter();
+    trees.try_for_each(|tree| write_tree(tree, out, is_stopped))
 }
 
-impl PhotoArgs {
-    fn name(&self) -> std::path::Display<'_> {
-        self.picture.display()
+/// Writes several trees, each to a folder of its own, and their scene.
+fn write_all(
+    out: &Path,
+    trees: Vec<PhotoTree>,
+    forest: ForestPlan,
+    is_stopped: &AtomicBool,
+) -> Result<(), CommandError> {
+    for (number, tree) in (1..).zip(trees) {
+        write_tree(tree, &out.join(tree_name(number)), is_stopped)?;
     }
-
-    fn read_picture(&self) -> Result<Photograph, CommandError> {
-        let bytes = read_bounded(&self.picture, LARGEST).map_err(|e| {
-            CommandError::NoInput(anyhow!("cannot read {}: {e}; give another", self.name()))
-        })?;
-        Photograph::read(&bytes).map_err(|e| CommandError::Failed(anyhow!("{}: {e}", self.name())))
-    }
-
-    /// The tree of `--like`.
-    fn like(&self) -> Result<Option<Example>, CommandError> {
-        let Some(path) = &self.like else {
-            return Ok(None);
-        };
-        let example = Example::read(path, None)?;
-        if Library::like(&example.document.skeleton).is_none() {
-            return Err(CommandError::BadUsage(anyhow!(
-                "--like {}: it has no branches that bear others; give another tree",
-                path.display()
-            )));
-        }
-        Ok(Some(example))
-    }
-
-    /// The region within the crown stroke; `None` where none was drawn.
-    fn crown(&self, photo: &Photograph) -> Result<Option<Outline>, CommandError> {
-        let Some(crown) = &self.crown else {
-            return Ok(None);
-        };
-        let scale = scale("--crown", crown.size, photo)?;
-        let corners_px: Vec<Point2<f64>> = crown.corners_px.iter().map(|c| c * scale).collect();
-        outline::from_polygon(&corners_px, photo.picture.size)
-            .map(Some)
-            .context("--crown")
-            .map_err(CommandError::BadUsage)
-    }
-
-    /// The branch strokes, each from its lower end if it is the first.
-    fn strokes(&self, photo: &Photograph) -> Result<Vec<Stroke>, CommandError> {
-        let mut strokes: Vec<Stroke> = Vec::new();
-        for line in self.branches.iter().flat_map(|lines| &lines.0) {
-            let scale = scale("--branch", line.size(), photo)?;
-            let stroke: Stroke = line
-                .polyline_px
-                .iter()
-                .map(|p| Point2::from(*p) * scale)
-                .collect();
-            if let Some(off) = stroke.iter().find(|at| !photo.picture.size.contains(**at)) {
-                let at = off / scale;
-                return Err(CommandError::BadUsage(anyhow!(
-                    "--branch: ({:.0}, {:.0}) lies outside the photograph; draw it on the tree",
-                    at.x,
-                    at.y
-                )));
-            }
-            strokes.push(stroke);
-        }
-        if let Some([first, .., last]) = strokes.first_mut().map(|s| &mut s[..])
-            && first.y < last.y
-        {
-            strokes[0].reverse();
-        }
-        Ok(strokes)
-    }
-
-    /// The strokes; for those that were not drawn what stands in the middle of the photograph, and its
-    /// trunk.
-    fn drawn(&self, photo: &Photograph) -> Result<Drawn, CommandError> {
-        let crown = self.crown(photo)?;
-        let strokes = self.strokes(photo)?;
-        if let (Some(crown), false) = (&crown, strokes.is_empty()) {
-            return Ok(Drawn {
-                crown: crown.clone(),
-                strokes,
-                found: None,
-            });
-        }
-        let middle = outline::in_middle(&photo.picture).map_err(CommandError::failed)?;
-        let middle = middle.ok_or_else(|| self.no_tree())?;
-        let mut outlines = middle.outlines.into_iter();
-        let with_trunk = outlines.find_map(|outline| Some((trunk_of(&outline)?, outline)));
-        let (trunk, outline) = with_trunk.ok_or_else(|| self.no_tree())?;
-        let strokes = match strokes.is_empty() {
-            true => vec![trunk],
-            false => strokes,
-        };
-        let agreement = 100.0 * middle.agreement;
-        let found = format!(
-            "the tree was found without strokes: two attempts agree by {agreement:.0} %; if it is \
-             wrong, draw --crown and --branch"
-        );
-        eprint_line(&format!("arborcam: note: {found}"));
-        Ok(Drawn {
-            crown: crown.unwrap_or(outline),
-            strokes,
-            found: Some(found),
-        })
-    }
-
-    fn no_tree(&self) -> CommandError {
-        CommandError::Failed(anyhow!(
-            "{}: no tree with a trunk is found in its middle; draw --crown and --branch",
-            self.name()
-        ))
-    }
-
-    fn seen(
-        &self,
-        photo: &Photograph,
-        drawn: &Drawn,
-        config: &Config,
-    ) -> Result<SeenInPhotograph, CommandError> {
-        let view = wood::Photograph {
-            picture: &photo.picture,
-            crown: &drawn.crown,
-            strokes: &drawn.strokes,
-            leaf_colour: self.foliage.into(),
-            trace_by: config.skeleton.trace_by,
-        };
-        let seen = wood::in_photograph(view, &CancelToken::new());
-        let seen = seen.map_err(CommandError::failed)?.ok_or_else(|| {
-            CommandError::Failed(anyhow!(
-                "{}: no wood is seen that leads to the foot of the trunk; draw the trunk with --branch",
-                self.name()
-            ))
-        })?;
-        let branches = &seen.wood.branches;
-        let is_met = |at: &Point2<f64>| branches.piece_at(*at, photo.picture.size).is_some();
-        match drawn.strokes.iter().position(|s| !s.iter().any(is_met)) {
-            Some(apart) => Err(CommandError::BadUsage(anyhow!(
-                "--branch: stroke {} meets no wood that leads to the trunk; draw it from the branch \
-                 that carries it",
-                apart + 1
-            ))),
-            None => Ok(seen),
-        }
-    }
-
-    fn stood_up(
-        &self,
-        photo: &Photograph,
-        drawn: &Drawn,
-        seen: &SeenInPhotograph,
-        like: Option<&Example>,
-        config: Config,
-    ) -> Result<PhotoTree, CommandError> {
-        let of_file = |e: anyhow::Error| CommandError::Failed(e.context(self.name().to_string()));
-        let corners = drawn.crown.polygon_px.iter();
-        let crown_px: Vec<Point2<f64>> = corners.map(|c| c.map(f64::from)).collect();
-        let size = photo.picture.size;
-        let flat = traced(&seen.wood.branches, size, &crown_px).map_err(|e| of_file(e.into()))?;
-        let region = match seen.in_leaf {
-            true => closed(size, &seen.tree),
-            false => outline::covered(&flat.cover_px(), size),
-        };
-        let region = region.map_err(|e| of_file(e.into()))?;
-        let name = self
-            .picture
-            .file_name()
-            .unwrap_or_default()
-            .to_string_lossy();
-        let parts = PhotoParts {
-            picture: &Arc::new(photo.picture.clone()),
-            flat: &flat,
-            region: &region,
-            in_leaf: seen.in_leaf,
-            wood: &seen.wood,
-        };
-        let growth = PhotoGrowth {
-            subtrees: self.subtrees.into(),
-            like: like.map(|example| &example.document),
-            depth: self.depth.into(),
-        };
-        Ok(PhotoTree::new(name.into_owned(), parts, growth, config)?)
-    }
+    write_forest(forest, out, is_stopped)
 }
 
-/// The tree of a mask in one piece, its gaps closed as little as it takes to hold nearly all.
-///
-/// # Errors
-/// The mask is empty.
-fn closed(size: Size, tree: &[u8]) -> Result<Outline, OutlineError> {
-    let all = tree.iter().filter(|m| **m != 0).count() as f64;
-    let mut share = CLOSE_SHARE;
-    loop {
-        let close_px = share * f64::from(size.width);
-        let found = outline::closed(size, tree, close_px.round() as u32)?;
-        let held = tree.iter().zip(&found.mask).filter(|(m, f)| **m & **f != 0);
-        if held.count() as f64 >= NEARLY_ALL * all || share >= CLOSE_MOST {
-            return Ok(found);
-        }
-        share *= 2.0;
+/// The strokes of a tree on which nothing is drawn.
+fn nothing_drawn() -> DrawnTree {
+    DrawnTree {
+        file: None,
+        strokes: TreeStrokes::default(),
     }
-}
-
-/// A line along the trunk of the tree in an outline, from its foot up; `None` where it has none.
-fn trunk_of(outline: &Outline) -> Option<Stroke> {
-    let foot = Foot::of(outline, None);
-    let rows = foot.trunk_rows(outline, TRUNK_SHARE);
-    let places = rows.iter().map(|row| {
-        let middle = 0.5 * f64::from(row.first + row.last);
-        Point2::new(middle, f64::from(row.v))
-    });
-    let line: Stroke = places.collect();
-    let is_seen = foot.basis != FootBasis::Guessed && line.len() >= LEAST_TRUNK_ROWS;
-    is_seen.then_some(line)
-}
-
-/// By what the pixels of a stroke are to be multiplied that was drawn in a picture of the size
-/// `drawn_in`.
-///
-/// # Errors
-/// That is another picture.
-fn scale(option: &str, drawn_in: Size, photo: &Photograph) -> Result<f64, CommandError> {
-    let own = photo.picture.size;
-    if drawn_in == own {
-        return Ok(1.0);
-    }
-    if drawn_in == photo.full_size {
-        return Ok(f64::from(own.width) / f64::from(drawn_in.width));
-    }
-    Err(CommandError::BadUsage(anyhow!(
-        "{option} is for a picture of {drawn_in}, this one is {}; draw it on this one",
-        photo.full_size
-    )))
 }

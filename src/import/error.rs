@@ -18,7 +18,7 @@ pub enum ImportError {
     NoCrown,
     #[error("{what}: {why}; correct it")]
     BadStroke { what: String, why: String },
-    #[error("its picture is {width}x{height} px, and must have 64 to 8192 px a side; scale it")]
+    #[error("its picture is {width}x{height} px, and must have 64 to 12288 px a side; scale it")]
     BadSize { width: f64, height: f64 },
     #[error("{first} and {second} are both marked as the trunk; mark one stroke")]
     TwoTrunks { first: String, second: String },

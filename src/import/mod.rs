@@ -3,13 +3,12 @@
 //! A sketch ([`read_sketch`]) is a set of strokes. Where they meet they are joined to a flat tree
 //! ([`joined`]), which is stood up in space as a captured one is (Li 2011 sect. 6 and fig. 9).
 //!
-//! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_crown`] reads the
-//! line that a user draws round a crown.
+//! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_strokes`] reads the
+//! lines that a user draws round a crown and along branches.
 //!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
 //! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
 
-mod crown;
 mod cylinders;
 mod error;
 mod flat_tree;
@@ -30,7 +29,6 @@ mod svg_place;
 mod traced;
 mod treefile;
 
-pub use crown::{Crown, read_crown};
 pub use error::ImportError;
 pub use flat_tree::FlatTree;
 pub use flatten::FlatModel;
@@ -38,5 +36,5 @@ pub use gltf_skeleton::MovingModel;
 pub use join::joined;
 pub use model_file::read_model;
 pub use model_tree::{ModelNode, ModelTree};
-pub use sketch::{Sketch, Stroke, read_sketch};
+pub use sketch::{Sketch, Stroke, read_sketch, read_strokes};
 pub use traced::traced;

@@ -9,7 +9,7 @@ use nalgebra::Point2;
 pub(super) const MOST_STROKES: usize = 2_000;
 pub(super) const MOST_POINTS: usize = 200_000;
 /// Sides of a picture, px.
-const SIDES_PX: std::ops::RangeInclusive<f64> = 64.0..=8192.0;
+const SIDES_PX: std::ops::RangeInclusive<f64> = 64.0..=12_288.0;
 
 /// A line along a branch, from its base to its tip or the other way.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,6 @@ pub struct Stroke {
 pub struct Sketch {
     /// Of the picture that it is drawn in.
     pub size: Size,
-    /// One at least.
     pub strokes: Vec<Stroke>,
     /// Corners of the outline of the crown, px; none where it was not drawn.
     pub crown_px: Vec<Point2<f64>>,
@@ -40,14 +39,26 @@ pub struct Sketch {
 /// It is neither, or holds no strokes; a stroke, a transform or the size cannot be read, or there
 /// are more strokes than anybody draws.
 pub fn read_sketch(bytes: &[u8]) -> Result<Sketch, ImportError> {
+    let sketch = read_strokes(bytes)?;
+    match sketch.strokes.is_empty() {
+        true => Err(ImportError::NoStrokes),
+        false => Ok(sketch),
+    }
+}
+
+/// Reads what was drawn on a picture: a sketch, which may have a crown and no strokes.
+///
+/// # Errors
+/// As of [`read_sketch`].
+pub fn read_strokes(bytes: &[u8]) -> Result<Sketch, ImportError> {
     parsed(bytes)?.checked()
 }
 
-/// A sketch as it is in the file, maybe without strokes.
+/// A sketch as it is in the file.
 ///
 /// # Errors
 /// It is neither SVG nor JSON, or cannot be read.
-pub(super) fn parsed(bytes: &[u8]) -> Result<Sketch, ImportError> {
+fn parsed(bytes: &[u8]) -> Result<Sketch, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|_| ImportError::bad_format("it is no text"))?;
     // Some editors put a byte order mark before it.
     let text = text.trim_start_matches('\u{feff}').trim_start();
@@ -72,11 +83,30 @@ pub(super) fn picture_size(width: f64, height: f64) -> Result<Size, ImportError>
 }
 
 impl Sketch {
+    /// Corners of the crown: of the line that is marked so, or of the only stroke, px.
+    ///
+    /// # Errors
+    /// No line is marked, and there is not one stroke alone.
+    pub fn only_crown_px(self) -> Result<Vec<Point2<f64>>, ImportError> {
+        if !self.crown_px.is_empty() {
+            return Ok(self.crown_px);
+        }
+        let mut strokes = self.strokes.into_iter();
+        match (strokes.next(), strokes.next()) {
+            (Some(only), None) => Ok(only.points_px),
+            _ => Err(ImportError::NoCrown),
+        }
+    }
+
+    /// The lines of the strokes, the trunk's first where it is marked, px.
+    pub fn lines_px(&self) -> Vec<Vec<Point2<f64>>> {
+        let mut strokes: Vec<&Stroke> = self.strokes.iter().collect();
+        strokes.sort_by_key(|stroke| !stroke.is_trunk);
+        strokes.into_iter().map(|s| s.points_px.clone()).collect()
+    }
+
     /// The same without points that are the same as the one before.
     fn checked(mut self) -> Result<Self, ImportError> {
-        if self.strokes.is_empty() {
-            return Err(ImportError::NoStrokes);
-        }
         let points = self.strokes.iter().map(|s| s.points_px.len()).sum();
         refuse_more("strokes", self.strokes.len(), MOST_STROKES)?;
         refuse_more("points", points, MOST_POINTS)?;

@@ -401,9 +401,9 @@ mod tests {
             ("<svg><path d='M1 2 L3 4'/></svg>", "size"),
             (
                 "<svg width='640' height='1'><path d='M1 0 L3 0'/></svg>",
-                "64 to 8192",
+                "64 to 12288",
             ),
-            ("<svg width='0' height='9'/>", "64 to 8192"),
+            ("<svg width='0' height='9'/>", "64 to 12288"),
             ("<svg viewBox='0 0 nan 1'/>", "viewBox"),
         ] {
             let error = read_sketch(whole.as_bytes()).expect_err(whole).to_string();

@@ -15,9 +15,11 @@ pub(super) struct InLeaf {
     seeds: Vec<Point2<f32>>,
     /// The picture shows them.
     filmed: bool,
-    /// A drawn density, where there is one: nothing grows outside of the outline, or of the shape
-    /// that the tree was cut to.
+    /// A drawn density or a mask of leaves, where there is one: nothing grows outside of the outline,
+    /// or of the shape that the tree was cut to.
     density: Option<Luma>,
+    /// It is a mask of leaves.
+    is_mask: bool,
 }
 
 impl InLeaf {
@@ -29,7 +31,8 @@ impl InLeaf {
         }
         let filmed = in_leaf(skeleton, seen.picture, seen.outline);
         // Who draws a density wants leaves.
-        if settings.show == LeafShow::Auto && !filmed && seen.density.is_none() {
+        let given = seen.density.or(seen.leaf_mask);
+        if settings.show == LeafShow::Auto && !filmed && given.is_none() {
             return None;
         }
         let mut seeds = match (seen.picture, seen.outline) {
@@ -41,8 +44,7 @@ impl InLeaf {
         if let Some(shape) = seen.cut_to {
             seeds.retain(|p| shape.contains(f64::from(p.x), f64::from(p.y)));
         }
-        let density = seen
-            .density
+        let density = given
             .cloned()
             .or_else(|| seen.cut_to.map(whole))
             .map(|drawn| {
@@ -60,6 +62,7 @@ impl InLeaf {
             seeds,
             filmed,
             density,
+            is_mask: seen.density.is_none() && seen.leaf_mask.is_some(),
         })
     }
 
@@ -113,6 +116,7 @@ impl InLeaf {
             outline,
             pose,
             density: self.density.as_ref(),
+            is_mask: self.is_mask,
             colours: self.colours(seen),
             palette: seen.leaf_rgb,
             seeds: &self.seeds,

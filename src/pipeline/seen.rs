@@ -24,4 +24,6 @@ pub struct Seen<'a> {
     /// picture's.
     pub leaf: Option<&'a Template>,
     pub density: Option<&'a Luma>,
+    /// Where a photograph shows leaves, pixel by pixel; a drawn density goes before it.
+    pub leaf_mask: Option<&'a Luma>,
 }

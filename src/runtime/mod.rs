@@ -24,6 +24,7 @@ mod losses;
 mod meter;
 mod model_thread;
 mod nap;
+mod one_frame;
 mod parallel;
 mod play;
 mod pulse;
@@ -47,6 +48,7 @@ mod watched;
 
 pub use finish::Written;
 pub use job::{Job, Summary};
+pub use one_frame::{FrameError, one_frame};
 pub use parallel::{Undone, in_parallel};
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};

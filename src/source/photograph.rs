@@ -1,8 +1,8 @@
 //! One photograph: PNG, JPEG or BMP, turned upright, and reduced where it is large.
 
 use crate::model::{Rgb, Size};
-use image::imageops::FilterType;
-use image::{DynamicImage, ImageDecoder, ImageReader, Limits};
+use image::imageops::{FilterType, resize};
+use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage};
 use std::io::Cursor;
 
 /// Pixels of a photograph that are read, at most.
@@ -24,8 +24,12 @@ pub struct Photograph {
 /// Why a file gives no photograph. Each message is one line that says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum PhotographError {
-    #[error("it is no picture that can be read ({what}); give a PNG or JPEG file")]
+    #[error(
+        "it is no picture that can be read ({what}); give a PNG or JPEG file, or --frame for a film"
+    )]
     BadFormat { what: String },
+    #[error("it is damaged: the JPEG is cut off before its end; copy or export it anew")]
+    CutOff,
     #[error("it has {megapixels} megapixels, and at most 64 are read; reduce it")]
     TooLarge { megapixels: u64 },
     #[error("it is {size} px, and must have 64 px a side at least; give a larger one")]
@@ -39,6 +43,10 @@ impl Photograph {
     /// # Errors
     /// It is damaged, of another format, too large or too small.
     pub fn read(bytes: &[u8]) -> Result<Self, PhotographError> {
+        // The decoder fills what is missing with grey, and does not say so.
+        if image::guess_format(bytes).ok() == Some(ImageFormat::Jpeg) && is_cut_off(bytes) {
+            return Err(PhotographError::CutOff);
+        }
         let mut reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(bad_format)?;
@@ -52,9 +60,7 @@ impl Photograph {
             });
         }
         let size = Size::new(width, height);
-        if width.min(height) < LEAST_SIDE_PX {
-            return Err(PhotographError::TooSmall { size });
-        }
+        refuse_small(size)?;
         let orientation = decoder.orientation().map_err(bad_format)?;
         let mut image = DynamicImage::from_decoder(decoder).map_err(bad_format)?;
         let longest = width.max(height);
@@ -78,6 +84,65 @@ impl Photograph {
     }
 }
 
+impl Photograph {
+    /// A frame of a film as a photograph.
+    ///
+    /// # Errors
+    /// It is too small.
+    pub fn of_frame(frame: Rgb) -> Result<Self, PhotographError> {
+        let full_size = frame.size;
+        refuse_small(full_size)?;
+        let longest = full_size.width.max(full_size.height);
+        let scale = f64::from(LONGEST_SIDE_PX) / f64::from(longest);
+        let whole = RgbImage::from_raw(full_size.width, full_size.height, frame.pixels);
+        let whole = whole.ok_or_else(|| bad_format("the frame is not whole"))?;
+        let reduced = match scale < 1.0 {
+            true => {
+                let side = |px: u32| (f64::from(px) * scale).round().max(1.0) as u32;
+                let (width, height) = (side(full_size.width), side(full_size.height));
+                resize(&whole, width, height, FilterType::Triangle)
+            }
+            false => whole,
+        };
+        Ok(Self {
+            full_size,
+            picture: Rgb {
+                size: Size::new(reduced.width(), reduced.height()),
+                pixels: reduced.into_raw(),
+            },
+        })
+    }
+}
+
+fn refuse_small(size: Size) -> Result<(), PhotographError> {
+    match size.width.min(size.height) < LEAST_SIDE_PX {
+        true => Err(PhotographError::TooSmall { size }),
+        false => Ok(()),
+    }
+}
+
+/// Whether a JPEG has no end mark behind the begin of its first scan (ITU-T T.81 annex B): within a
+/// scan no such two bytes occur. What may stand behind the end mark, as phones add films, does not
+/// count.
+fn is_cut_off(bytes: &[u8]) -> bool {
+    const BEGIN_OF_SCAN: u8 = 0xda;
+    const END: [u8; 2] = [0xff, 0xd9];
+    // Behind the mark of the begin of the picture.
+    let mut at = 2;
+    while let Some([0xff, marker, rest @ ..]) = bytes.get(at..) {
+        match (*marker, rest) {
+            (BEGIN_OF_SCAN, scan) => return !scan.windows(2).any(|pair| pair == END),
+            // Filling, and marks without a length.
+            (0xff, _) => at += 1,
+            (0x01 | 0xd0..=0xd7, _) => at += 2,
+            (_, [high, low, ..]) => at += 2 + usize::from(u16::from_be_bytes([*high, *low])),
+            _ => return true,
+        }
+    }
+    // What is there instead of a mark is left to the decoder.
+    at >= bytes.len()
+}
+
 fn bad_format(e: impl std::fmt::Display) -> PhotographError {
     PhotographError::BadFormat {
         what: e.to_string().replace('\n', " "),
@@ -91,9 +156,7 @@ mod tests {
 
     fn png(image: &DynamicImage) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
-        image
-            .write_to(&mut bytes, image::ImageFormat::Png)
-            .expect("png");
+        image.write_to(&mut bytes, ImageFormat::Png).expect("png");
         bytes.into_inner()
     }
 
@@ -150,6 +213,37 @@ mod tests {
         assert_eq!(read.full_size, Size::new(80, 120));
         // What was above is on the right.
         assert!(read.picture.at(70, 60)[0] > 150 && read.picture.at(10, 60)[2] > 150);
+    }
+
+    #[test]
+    fn a_jpeg_that_is_cut_off_is_damaged_wherever_that_is() {
+        let mut bytes = Cursor::new(Vec::new());
+        let image = DynamicImage::from(halves(200, 100));
+        image.write_to(&mut bytes, ImageFormat::Jpeg).expect("jpeg");
+        let mut whole = bytes.into_inner();
+        assert!(Photograph::read(&whole).is_ok());
+        for kept in [4, 30, whole.len() / 2, whole.len() - 20, whole.len() - 1] {
+            let error = Photograph::read(&whole[..kept]).expect_err("cut off");
+            assert!(error.to_string().contains("damaged"), "{kept}: {error}");
+        }
+        // What phones add behind the picture is none of it.
+        whole.extend([0xff, 0xda, 1, 2, 3]);
+        assert!(Photograph::read(&whole).is_ok());
+    }
+
+    #[test]
+    fn a_frame_of_a_film_is_reduced_as_a_photograph_is() {
+        let frame = |width, height| Rgb {
+            size: Size::new(width, height),
+            pixels: halves(width, height).into_raw(),
+        };
+        let large = Photograph::of_frame(frame(3072, 2000)).expect("a photograph");
+        assert_eq!(large.picture.size, Size::new(1536, 1000));
+        assert_eq!(large.full_size, Size::new(3072, 2000));
+        assert_eq!(large.picture.at(700, 900), [0, 0, 200]);
+        let small = Photograph::of_frame(frame(640, 360)).expect("a photograph");
+        assert_eq!(small.picture, frame(640, 360));
+        assert!(Photograph::of_frame(frame(640, 36)).is_err());
     }
 
     #[test]

@@ -340,7 +340,7 @@ fn begin_drawing(subject: Subject, state: &mut State) {
     state.drawing.get_or_insert_with(|| Drawing::of(subject));
 }
 
-fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
+pub(super) fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
     let pixel = placed.and_then(|p| p.pixel_at(column, row));
     match (&mut state.drawing, pixel) {
         (Some(drawing), Some(pixel)) => {
@@ -351,7 +351,8 @@ fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {
     }
 }
 
-fn draw(
+/// Does what a key asks for while something is drawn; what is made of it once it is finished.
+pub(super) fn draw(
     action: DrawingAction,
     mut drawing: Drawing,
     state: &mut State,

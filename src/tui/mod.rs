@@ -18,6 +18,7 @@ mod layout;
 mod moving;
 mod opened;
 mod panels;
+mod photo;
 mod placed;
 mod plot;
 mod progress;
@@ -36,6 +37,7 @@ pub use count_bar::CountBar;
 pub use graphics::Preview;
 pub use moving::{AnimationCommand, Moving, watch};
 pub use opened::{Options, TuiError};
+pub use photo::{FoundTree, PhotoSession, draw_on_photo};
 pub use progress::Progress;
 pub use theme::Depth;
 

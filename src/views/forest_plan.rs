@@ -8,7 +8,7 @@ use crate::model::{Forest, Ground, Size};
 use std::path::Path;
 
 /// Height of the example where no scale is known and none was given, m.
-const HEIGHT_M: f64 = 10.0;
+pub(super) const HEIGHT_M: f64 = 10.0;
 /// From the lowest to the highest place of a height map where that is not given, as a share of the
 /// plot's width.
 const RELIEF_SHARE: f64 = 0.1;

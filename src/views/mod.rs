@@ -8,7 +8,10 @@ mod forest;
 mod forest_plan;
 mod loops;
 mod offspring;
+#[cfg(feature = "opencv")]
 mod photo;
+#[cfg(feature = "opencv")]
+mod photo_forest;
 mod prepared;
 mod studio;
 mod tables;
@@ -21,7 +24,13 @@ pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
 };
-pub use photo::{PhotoDepth, PhotoGrowth, PhotoParts, PhotoTree, photo_defaults};
+#[cfg(feature = "opencv")]
+pub use photo::{
+    Attracting, PhotoDepth, PhotoExample, PhotoGrowth, PhotoParts, PhotoTree, PhotoTreeError,
+    photo_defaults,
+};
+#[cfg(feature = "opencv")]
+pub use photo_forest::{StandingPlaces, photo_forest};
 pub use prepared::{PreparedTree, TreeOptions};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;

@@ -8,7 +8,8 @@ use crate::document::note::{BarkNote, MasksNote, ModelNote, PictureNote};
 use crate::document::{BARK_FILE, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE, WOOD_MASK_FILE};
 use crate::grow::{Growth, GrowthRegion, Library, ROUNDS, SubtreeKind, grow_subtrees, sample_sway};
 use crate::import::FlatTree;
-use crate::model::{Outline, Picture, Rgb, Skeleton, Swaying, Wood};
+use crate::model::{Outline, Picture, Skeleton, Swaying, Wood};
+use crate::pipeline::{PhotoError, TreeInPhoto};
 use crate::random::generator;
 use crate::shape::{self, Silhouette};
 use std::path::{Path, PathBuf};
@@ -17,6 +18,10 @@ use std::sync::Arc;
 /// Triangles of all leaves: a photograph shows single ones. With the 20,000 of a film the silhouette of
 /// made photographs is met by 0.76 instead of 0.80.
 const LEAF_TRIANGLES: u32 = 100_000;
+
+/// How deep a crown is by how wide it is (deviations of its wood). A photograph does not show it: by the
+/// truth of made ones it is 0.3 to 1.0, with this in the middle.
+const CROWN_DEPTH: f64 = 0.65;
 
 /// The settings that trees of photographs have if no others are given.
 pub fn photo_defaults() -> Config {
@@ -27,16 +32,32 @@ pub fn photo_defaults() -> Config {
     config
 }
 
-/// What a photograph shows of a tree.
+/// A photograph and the tree that it shows.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotoParts<'a> {
-    pub picture: &'a Arc<Rgb>,
-    /// The visible branches.
-    pub flat: &'a FlatTree,
-    /// Where the tree is, in one piece.
-    pub region: &'a Outline,
-    pub in_leaf: bool,
-    pub wood: &'a Wood,
+    /// Where it is from.
+    pub name: &'a str,
+    pub picture: &'a Picture,
+    pub tree: &'a TreeInPhoto,
+}
+
+/// A tree that one in a photograph is like: its subtrees, and its sway.
+#[derive(Clone, Debug)]
+pub struct PhotoExample {
+    library: Library,
+    skeleton: Arc<Skeleton>,
+    sway: Vec<Swaying>,
+}
+
+impl PhotoExample {
+    /// `None` where it has no branches that bear others.
+    pub fn of(document: Document) -> Option<Self> {
+        Some(Self {
+            library: Library::like(&document.skeleton)?,
+            skeleton: document.skeleton,
+            sway: document.sway,
+        })
+    }
 }
 
 /// How a tree of a photograph goes on where it is not seen.
@@ -45,9 +66,21 @@ pub struct PhotoGrowth<'a> {
     /// Which ready-made subtrees are used where too few branches are seen.
     pub subtrees: SubtreeKind,
     /// A tree whose subtrees are used instead, and whose sway is that of the new tree by chance.
-    pub like: Option<&'a Document>,
+    pub like: Option<&'a PhotoExample>,
     /// How the visible branches come into space.
     pub depth: PhotoDepth,
+    /// What draws new branches.
+    pub attractors: Attracting,
+}
+
+/// What draws new branches of a photographed tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Attracting {
+    /// The leaves in the picture and, in turns, the tree's own joints turned by 90 degrees.
+    #[default]
+    Space,
+    /// The leaves in the picture alone: from the side the tree has gaps (Tan et al. 2008 fig. 6).
+    Picture,
 }
 
 /// How branches that are seen in one picture come into space.
@@ -58,6 +91,15 @@ pub enum PhotoDepth {
     Push,
     /// They lie as far apart as they can (Okabe et al. 2005).
     Apart,
+}
+
+/// Why a photograph gave no tree in space.
+#[derive(Debug, thiserror::Error)]
+pub enum PhotoTreeError {
+    #[error(transparent)]
+    Photo(#[from] PhotoError),
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
 }
 
 /// The tree of a photograph in space.
@@ -71,53 +113,59 @@ pub struct PhotoTree {
 }
 
 impl PhotoTree {
-    /// Stands the visible branches up in space and, of a tree in leaf, grows those that leaves hide.
-    /// `name` says where the photograph is from. A bare tree gets neither leaves nor twigs but those
-    /// that are seen.
+    /// Stands the visible branches up in space and, of a tree in leaf, grows those that leaves hide. A
+    /// bare tree gets neither leaves nor twigs but those that are seen.
     ///
     /// # Errors
-    /// It has too many branches.
+    /// It has no branches or too many, or there is nothing of it.
     pub fn new(
-        name: String,
         parts: PhotoParts,
         growth: PhotoGrowth,
         mut config: Config,
-    ) -> Result<Self, PrepareError> {
-        config.leaves.show = match (config.leaves.show, parts.in_leaf) {
+    ) -> Result<Self, PhotoTreeError> {
+        let TreeInPhoto { seen, strokes, .. } = parts.tree;
+        let (in_leaf, wood) = (seen.in_leaf, &seen.wood);
+        let flat = parts.tree.flat_tree()?;
+        let region = parts.tree.region(&flat)?;
+        config.leaves.show = match (config.leaves.show, in_leaf) {
             (LeafShow::Auto, true) => LeafShow::On,
             (LeafShow::Auto, false) => LeafShow::Off,
             (wished, _) => wished,
         };
-        if !parts.in_leaf {
+        if !in_leaf {
             config.wood.twig_px = 0.0;
         }
-        let mut tree = DrawnTree::new(name, parts.flat, parts.region, config)?;
+        let lines = strokes
+            .iter()
+            .map(|s| s.iter().map(|p| [p.x, p.y]).collect());
+        config.skeleton.strokes_px = lines.collect();
+        let mut tree = DrawnTree::new(parts.name.to_owned(), &flat, &region, config)?;
         if growth.depth == PhotoDepth::Apart {
-            let trunk = on_trunk(&tree.skeleton, parts.flat);
+            let trunk = on_trunk(&tree.skeleton, &flat);
             shape::set_depths_apart(&mut tree.skeleton, &trunk);
         }
         let seed = tree.note.config.wood.seed.into();
         let mut grown = Growth::default();
-        if parts.in_leaf {
-            grown = grow(&mut tree, parts.region, growth, seed);
-            tree.note.model = Some(ModelNote::of(
-                &tree.skeleton,
-                tree.note.config.export.metres_per_px,
-            ));
+        if in_leaf {
+            grown = grow(&mut tree, &region, growth, seed);
         }
+        shape::set_depth_share(&mut tree.skeleton, CROWN_DEPTH);
         let sway = growth.like.map_or(Vec::new(), |like| {
             let random = &mut generator(seed, 1);
             sample_sway(&like.skeleton, &like.sway, &tree.skeleton, random)
         });
         let note = &mut tree.note;
+        let metres_per_px = note.config.export.metres_per_px;
+        note.model = Some(ModelNote::of(&tree.skeleton, metres_per_px));
         note.picture = Some(PictureNote {
             file: PICTURE_FILE.into(),
-            ..PictureNote::default()
+            frame: parts.picture.frame,
+            time_s: parts.picture.time_s,
         });
-        note.bark = parts.wood.bark.as_ref().map(|_| BarkNote {
+        note.bark = wood.bark.as_ref().map(|_| BarkNote {
             file: BARK_FILE.into(),
         });
-        note.masks = parts.wood.at_rest.as_ref().map(|_| MasksNote {
+        note.masks = wood.at_rest.as_ref().map(|_| MasksNote {
             wood: WOOD_MASK_FILE.into(),
             leaves: LEAVES_MASK_FILE.into(),
             rest: REST_FILE.into(),
@@ -126,13 +174,15 @@ impl PhotoTree {
             tree,
             growth: grown,
             sway,
-            picture: Picture {
-                rgb: parts.picture.clone(),
-                frame: 0,
-                time_s: 0.0,
-            },
-            wood: parts.wood.clone(),
+            picture: parts.picture.clone(),
+            wood: wood.clone(),
         })
+    }
+
+    /// From its foot to its top, px.
+    pub fn height_px(&self) -> f64 {
+        let nodes = self.tree.skeleton.nodes.iter();
+        nodes.map(|node| node.position.y).fold(0.0, f64::max)
     }
 
     /// Writes it as a document to `dir`, which appears when it is complete.
@@ -155,15 +205,17 @@ impl PhotoTree {
 
 /// Grows the branches that are not seen.
 fn grow(tree: &mut DrawnTree, region: &Outline, growth: PhotoGrowth, seed: u64) -> Growth {
-    let example = growth.like.map_or(&tree.skeleton, |like| &like.skeleton);
-    let library = Library::of(example, growth.subtrees);
+    let library = match growth.like {
+        Some(like) => like.library.clone(),
+        None => Library::of(&tree.skeleton, growth.subtrees),
+    };
     let silhouette = Silhouette::Filmed(tree.note.config.shape.envelope);
     let room = shape::room(&tree.skeleton, Some(region), silhouette);
     let width_px = f64::from(tree.skeleton.image_size.width);
     let region = GrowthRegion {
         tree: region,
         room: &room,
-        in_space: true,
+        in_space: growth.attractors == Attracting::Space,
         tip_px: shape::TIP_RADIUS_PX * width_px / 640.0,
     };
     let random = &mut generator(seed, 0);

@@ -134,7 +134,8 @@ impl PreparedTree {
             bark: document.bark.as_ref(),
             leaf_rgb: document.note.leaf_rgb(),
             leaf: leaf.as_ref(),
-            density: density.as_ref().or(document.leaf_mask.as_deref()),
+            density: density.as_ref(),
+            leaf_mask: document.leaf_mask.as_deref(),
         };
         let dressed = dress(&posed.skeleton, seen, &config);
         let flutter = flutter(&dressed, &posed.poses, &posed.skeleton, &config);

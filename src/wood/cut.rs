@@ -46,6 +46,31 @@ pub fn neighbour(pixel: usize, pair: usize, size: Size) -> Option<usize> {
     is_in.then(|| (v * width + u) as usize)
 }
 
+/// The links of [`least_cut`] between the pixels within `region` (one byte a pixel, 0 outside): `cost`
+/// says what it costs that a pixel and its neighbour, in this of the four directions, differ. Nothing
+/// links what is beyond the region.
+pub fn links_within(
+    region: &[u8],
+    size: Size,
+    cost: impl Fn(usize, usize, usize) -> f64,
+) -> Vec<[f32; PAIRS]> {
+    let mut links = vec![[0.0; PAIRS]; region.len()];
+    let inside = links.iter_mut().enumerate();
+    for (i, links) in inside.filter(|(i, _)| region[*i] != 0) {
+        for (pair, link) in links.iter_mut().enumerate() {
+            if let Some(next) = neighbour(i, pair, size).filter(|next| region[*next] != 0) {
+                *link = cost(i, next, pair) as f32;
+            }
+        }
+    }
+    links
+}
+
+/// Whether a direction of [`neighbour`] leads to a diagonal one: every second does.
+pub fn is_diagonal(pair: usize) -> bool {
+    pair % 2 == 1
+}
+
 /// Whether each pixel gets the first label. `odds` are those of the first label, as a logarithm;
 /// `links` is what it costs that a pixel and its [`neighbour`] in each of the four directions
 /// differ, at least 0. Row by row. `None` where `cancel` ends the work.

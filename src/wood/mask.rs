@@ -2,7 +2,7 @@
 //! terms are what the motion says of a pixel, its colour, held against mixtures of colours, and
 //! whether it is on a ridge.
 
-use super::cut::{PAIRS, SURE, least_cut, neighbour};
+use super::cut::{PAIRS, SURE, is_diagonal, least_cut, links_within, neighbour};
 use super::evidence::Evidence;
 use super::mixture::{Mixtures, Seed};
 use super::{Stroke, blurred, colour_mat};
@@ -297,30 +297,25 @@ impl Clues<'_> {
 /// What it costs that neighbours differ: little where their colours do (Boykov and Jolly 2001).
 /// Nothing links what is beyond the region.
 pub(super) fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
-    let apart = |i: usize, pair: usize| {
-        let next = neighbour(i, pair, size).filter(|next| region[i] != 0 && region[*next] != 0)?;
-        Some((colour(&pixels[i]) - colour(&pixels[next])).norm_squared())
-    };
+    let apart = |i: usize, next: usize| (colour(&pixels[i]) - colour(&pixels[next])).norm_squared();
     let (mut sum, mut count) = (0.0, 0_usize);
-    let within = (0..pixels.len()).filter(|i| region[*i] != 0);
-    for apart in within.flat_map(|i| (0..PAIRS).filter_map(move |pair| apart(i, pair))) {
-        sum += apart;
-        count += 1;
-    }
-    let mean = (sum / count.max(1) as f64).max(f64::MIN_POSITIVE);
-    let mut links = vec![[0.0; PAIRS]; pixels.len()];
-    for (i, links) in links
-        .iter_mut()
-        .enumerate()
-        .filter(|(i, _)| region[*i] != 0)
-    {
-        for (pair, link) in links.iter_mut().enumerate() {
-            let length = if pair % 2 == 1 { f64::sqrt(2.0) } else { 1.0 };
-            let most = f64::from(LINK) / length;
-            *link = apart(i, pair).map_or(0.0, |apart| most * (-apart / (2.0 * mean)).exp()) as f32;
+    for i in (0..pixels.len()).filter(|i| region[*i] != 0) {
+        let neighbours = (0..PAIRS).filter_map(|pair| neighbour(i, pair, size));
+        for next in neighbours.filter(|next| region[*next] != 0) {
+            sum += apart(i, next);
+            count += 1;
         }
     }
-    links
+    let mean = (sum / count.max(1) as f64).max(f64::MIN_POSITIVE);
+    links_within(region, size, |i, next, pair| {
+        let length = if is_diagonal(pair) {
+            f64::sqrt(2.0)
+        } else {
+            1.0
+        };
+        let most = f64::from(LINK) / length;
+        most * (-apart(i, next) / (2.0 * mean)).exp()
+    })
 }
 
 /// The trunk is looked for by its colour over so great a share of the tree's height above the foot.

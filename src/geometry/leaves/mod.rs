@@ -162,6 +162,7 @@ impl Planting<'_> {
             count: self.count,
             seed: self.seed,
             sampling,
+            is_mask: self.view.is_mask,
         }
     }
 }

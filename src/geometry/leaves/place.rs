@@ -37,6 +37,11 @@ const ASIDE: f64 = 0.02;
 const DEEPEST: f64 = 1.0 / 15.0;
 /// The crown's emptiest places are looked for in cubes of so many cluster sizes.
 const CUBE: f64 = 1.5;
+/// Where the target is a mask of leaves, so great a share of a cluster's corners at least is seen where
+/// more than so much of a cell is wanted, in one of so many turns; or it is left out.
+const LEAST_WITHIN: f64 = 0.8;
+const HALF_WANTED: f32 = 0.5;
+const TURNS: u32 = 4;
 /// Golden section: values `k * GOLDEN mod 1` fill the interval evenly for any number of them.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -56,6 +61,8 @@ pub(super) struct LeafPlacer<'a> {
     pub count: usize,
     pub seed: u64,
     pub sampling: Sampling,
+    /// The target is a mask of single leaves.
+    pub is_mask: bool,
 }
 
 impl LeafPlacer<'_> {
@@ -321,18 +328,39 @@ impl LeafPlacer<'_> {
         }
     }
 
+    /// Whether most of a cluster is seen where leaves are wanted.
+    fn is_within(&self, corners: impl Iterator<Item = Point2<f64>>) -> bool {
+        let (mut within, mut all) = (0_usize, 0_usize);
+        for cell in corners {
+            let place = self.target.grid.index(cell);
+            let is_wanted = place.is_some_and(|i| self.target.wanted[i] > HALF_WANTED);
+            within += usize::from(is_wanted);
+            all += 1;
+        }
+        within as f64 >= LEAST_WITHIN * all as f64
+    }
+
     /// Orients a cluster and notes what it covers.
     fn put(&self, mut cluster: Cluster, work: &mut Work<'_>) {
         let attachment = &self.attachments.all[cluster.attachment];
-        let off = normal_vector(&mut work.random);
-        cluster.turn = orientation(attachment, &cluster.centre, &self.axis, off);
         if !cluster.centre.coords.iter().all(|x| x.is_finite()) {
             return;
         }
         let mut seen: Vec<(Point2<f64>, f64)> = Vec::with_capacity(self.template.positions.len());
-        for p in &self.template.positions {
-            let posed = attachment.carried.posed(&cluster.at(self.template, p));
-            seen.push((self.target.grid.cell_of(&posed), posed.z));
+        for turn in 1..=TURNS {
+            let off = normal_vector(&mut work.random);
+            cluster.turn = orientation(attachment, &cluster.centre, &self.axis, off);
+            seen.clear();
+            for p in &self.template.positions {
+                let posed = attachment.carried.posed(&cluster.at(self.template, p));
+                seen.push((self.target.grid.cell_of(&posed), posed.z));
+            }
+            if !self.is_mask || self.is_within(seen.iter().map(|(cell, _)| *cell)) {
+                break;
+            }
+            if turn == TURNS {
+                return;
+            }
         }
         for t in self.template.indices.chunks_exact(3) {
             let [a, b, c] = [t[0], t[1], t[2]].map(|i| seen[i as usize]);

@@ -16,6 +16,9 @@ pub struct LeafView<'a> {
     /// A drawn density that goes before the picture's: white is covered with leaves. Of any size,
     /// for the whole picture.
     pub density: Option<&'a Luma>,
+    /// The density is a mask of single leaves, and none is put where most of it would be seen beside
+    /// them (Tan et al. 2008 sect. 3.3).
+    pub is_mask: bool,
     pub colours: LeafColours,
     /// Colours of leaves (sRGB) where the picture shows none, by chance; may be empty.
     pub palette: &'a [[u8; 3]],

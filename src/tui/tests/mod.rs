@@ -3,4 +3,5 @@
 mod keys;
 pub mod made_up;
 mod moving;
+mod photo;
 mod screens;

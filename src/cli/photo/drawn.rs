@@ -1,0 +1,134 @@
+//! The strokes of `arborcam photo` that are given as files.
+
+use super::nothing_drawn;
+use super::picture::ShownPicture;
+use crate::cli::command_error::CommandError;
+use crate::cli::line::of_another_picture;
+use crate::files::read_bounded;
+use crate::import::{ImportError, Sketch, read_strokes};
+use crate::model::TreeStrokes;
+use anyhow::anyhow;
+use clap::Args;
+use nalgebra::Point2;
+use std::path::Path;
+
+/// Largest file of strokes that is read, bytes.
+const LARGEST: u64 = 64_000_000;
+
+#[derive(Debug, Args)]
+pub struct StrokeFiles {
+    /// A closed line round the crown, in the pixels of the photograph: JSON (width, height,
+    /// polygon_px), or SVG.
+    #[arg(long, value_name = "FILE", value_parser = StrokeFile::parse)]
+    crown: Option<StrokeFile>,
+    /// A line along a branch from its base to its tip, the trunk's first: JSON (width, height,
+    /// polyline_px), or a drawing as for `sketch` (SVG, JSON). May be given several times.
+    #[arg(long = "branch", value_name = "FILE", value_parser = StrokeFile::parse)]
+    branches: Vec<StrokeFile>,
+    /// Crown and strokes of one tree in one drawing as for `sketch` (SVG with a line marked `crown`,
+    /// JSON with polygon_px). Given several times: several trees, which come into one scene.
+    #[arg(
+        long = "tree",
+        value_name = "FILE",
+        value_parser = StrokeFile::parse,
+        conflicts_with_all = ["crown", "branches"]
+    )]
+    trees: Vec<StrokeFile>,
+}
+
+/// What a file holds.
+#[derive(Clone, Debug)]
+struct StrokeFile {
+    name: String,
+    sketch: Sketch,
+}
+
+/// The strokes of one tree, px of the picture that is worked on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DrawnTree {
+    /// Where they are from, if all are from one file.
+    pub file: Option<String>,
+    pub strokes: TreeStrokes,
+}
+
+impl StrokeFile {
+    fn parse(path: &str) -> Result<Self, String> {
+        let bytes =
+            read_bounded(Path::new(path), LARGEST).map_err(|e| format!("{e}; give a file"))?;
+        let sketch = read_strokes(&bytes).map_err(|e| e.to_string())?;
+        match sketch.strokes.is_empty() && sketch.crown_px.is_empty() {
+            true => Err(ImportError::NoStrokes.to_string()),
+            false => Ok(Self {
+                name: path.to_owned(),
+                sketch,
+            }),
+        }
+    }
+
+    /// By what its pixels are to be multiplied, which may be those of the photograph before it was
+    /// reduced.
+    fn scale(&self, option: &str, shown: &ShownPicture) -> Result<f64, CommandError> {
+        if self.sketch.size == shown.picture.rgb.size {
+            return Ok(1.0);
+        }
+        if self.sketch.size == shown.full_size {
+            return Ok(shown.scale());
+        }
+        Err(of_another_picture(
+            option,
+            self.sketch.size,
+            shown.full_size,
+        ))
+    }
+}
+
+impl StrokeFiles {
+    /// What is drawn on a photograph: one tree at least, though maybe without a stroke.
+    ///
+    /// # Errors
+    /// A file is for another picture, or of several trees one has no crown or no stroke.
+    pub fn on(&self, shown: &ShownPicture) -> Result<Vec<DrawnTree>, CommandError> {
+        if self.trees.is_empty() {
+            return Ok(vec![self.single(shown)?]);
+        }
+        let mut trees = Vec::with_capacity(self.trees.len());
+        for file in &self.trees {
+            let strokes = TreeStrokes {
+                crown_px: file.sketch.crown_px.clone(),
+                branches_px: file.sketch.lines_px(),
+            };
+            let is_whole = !strokes.crown_px.is_empty() && !strokes.branches_px.is_empty();
+            if self.trees.len() > 1 && !is_whole {
+                return Err(CommandError::BadUsage(anyhow!(
+                    "--tree {}: each of several trees needs a crown and a stroke along its trunk; draw both",
+                    file.name
+                )));
+            }
+            trees.push(DrawnTree {
+                file: Some(file.name.clone()),
+                strokes: strokes.scaled(file.scale("--tree", shown)?),
+            });
+        }
+        Ok(trees)
+    }
+
+    /// What `--crown` and `--branch` give.
+    fn single(&self, shown: &ShownPicture) -> Result<DrawnTree, CommandError> {
+        let mut tree = nothing_drawn();
+        if let Some(file) = &self.crown {
+            let crown_px = file.sketch.clone().only_crown_px();
+            let crown_px = crown_px
+                .map_err(|e| CommandError::BadUsage(anyhow!("--crown {}: {e}", file.name)))?;
+            let scale = file.scale("--crown", shown)?;
+            tree.strokes.crown_px = crown_px.iter().map(|at| at * scale).collect();
+        }
+        for file in &self.branches {
+            let scale = file.scale("--branch", shown)?;
+            for line in file.sketch.lines_px() {
+                let line: Vec<Point2<f64>> = line.iter().map(|at| at * scale).collect();
+                tree.strokes.branches_px.push(line);
+            }
+        }
+        Ok(tree)
+    }
+}

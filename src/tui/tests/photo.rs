@@ -1,0 +1,214 @@
+//! The screen on which a user draws on a photograph.
+
+use crate::model::{AtRest, BranchGraph, Rgb, Size, TreeStrokes, Wood, WoodNode};
+use crate::tui::graphics::Graphics;
+use crate::tui::panels::preview::Preview;
+use crate::tui::photo::{FoundTree, Next, PhotoSession, Sheet};
+use crate::tui::theme::{Depth, Theme};
+use nalgebra::Point2;
+use ratatui::Terminal;
+use ratatui::backend::TestBackend;
+use ratatui::crossterm::event::{
+    Event, KeyCode, KeyEvent, KeyModifiers, MouseButton, MouseEvent, MouseEventKind,
+};
+use std::sync::Arc;
+
+const SIZE: Size = Size {
+    width: 160,
+    height: 90,
+};
+
+/// Finds a trunk with two limbs wherever a branch is drawn.
+#[derive(Default)]
+struct Puppet {
+    looked: Vec<TreeStrokes>,
+}
+
+impl PhotoSession for Puppet {
+    fn name(&self) -> &str {
+        "oak.jpg"
+    }
+
+    fn picture(&self) -> Arc<Rgb> {
+        Arc::new(Rgb {
+            size: SIZE,
+            pixels: vec![120; 3 * SIZE.area()],
+        })
+    }
+
+    fn look(&mut self, strokes: &TreeStrokes) -> Result<FoundTree, String> {
+        self.looked.push(strokes.clone());
+        if strokes.branches_px.is_empty() {
+            return Err("no tree with a trunk is found".into());
+        }
+        let nodes = vec![
+            WoodNode::made_up(None, 80.0, 85.0),
+            WoodNode::made_up(Some(0), 80.0, 50.0),
+            WoodNode::made_up(Some(1), 50.0, 15.0),
+            WoodNode::made_up(Some(1), 110.0, 15.0),
+        ];
+        Ok(FoundTree {
+            wood: Wood {
+                branches: BranchGraph { nodes },
+                bark: None,
+                at_rest: Some(Arc::new(AtRest::made_up(SIZE))),
+            },
+            in_leaf: false,
+            agreement: None,
+        })
+    }
+}
+
+struct Screen {
+    sheet: Sheet,
+    puppet: Puppet,
+    preview: Preview,
+    terminal: Terminal<TestBackend>,
+}
+
+impl Screen {
+    fn new(width: u16, height: u16) -> Self {
+        let puppet = Puppet::default();
+        let mut screen = Self {
+            sheet: Sheet::new(&puppet, Vec::new()),
+            puppet,
+            preview: Preview::new(Graphics::characters(Depth::None)),
+            terminal: Terminal::new(TestBackend::new(width, height)).expect("terminal"),
+        };
+        screen.sheet.look(&mut screen.puppet);
+        screen.draw();
+        screen
+    }
+
+    fn draw(&mut self) {
+        let (sheet, preview) = (&self.sheet, &mut self.preview);
+        let theme = Theme::new(Depth::None);
+        self.terminal
+            .draw(|frame| sheet.render(frame, theme, preview))
+            .expect("drawn");
+    }
+
+    fn event(&mut self, event: &Event) -> Next {
+        let next = self.sheet.handle(event, self.preview.placed.as_ref());
+        if next == Next::Look {
+            self.sheet.look(&mut self.puppet);
+        }
+        self.draw();
+        next
+    }
+
+    fn press(&mut self, key: KeyCode) -> Next {
+        self.event(&Event::Key(KeyEvent::new(key, KeyModifiers::NONE)))
+    }
+
+    fn click(&mut self, at: [f64; 2]) {
+        let placed = self.preview.placed.expect("a picture");
+        let cell = placed.cell_from_pixel(Point2::from(at));
+        let (column, row) = cell.expect("in the picture");
+        self.event(&Event::Mouse(MouseEvent {
+            kind: MouseEventKind::Down(MouseButton::Left),
+            column,
+            row,
+            modifiers: KeyModifiers::NONE,
+        }));
+    }
+
+    /// Draws a line by the mouse; what its end asks for.
+    fn stroke(&mut self, key: char, points: &[[f64; 2]]) -> Next {
+        self.press(KeyCode::Char(key));
+        points.iter().for_each(|at| self.click(*at));
+        self.press(KeyCode::Enter)
+    }
+
+    fn shown(&self) -> String {
+        self.terminal.backend().to_string()
+    }
+}
+
+const CROWN: [[f64; 2]; 4] = [[30.0, 5.0], [130.0, 5.0], [130.0, 50.0], [30.0, 50.0]];
+const TRUNK: [[f64; 2]; 2] = [[80.0, 85.0], [80.0, 40.0]];
+
+#[test]
+fn strokes_by_the_mouse_are_looked_at_one_by_one_and_accepted() {
+    let mut screen = Screen::new(80, 24);
+    assert!(
+        screen.shown().contains("no tree with a trunk"),
+        "{}",
+        screen.shown()
+    );
+    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
+    assert!(screen.shown().contains("Not yet"), "{}", screen.shown());
+    assert_eq!(screen.stroke('c', &CROWN), Next::Look);
+    assert_eq!(screen.stroke('b', &TRUNK), Next::Look);
+    assert_eq!(screen.puppet.looked.len(), 3);
+    let last = &screen.puppet.looked[2];
+    assert_eq!((last.crown_px.len(), last.branches_px.len()), (4, 1));
+    for (set, asked) in last.branches_px[0].iter().zip(TRUNK) {
+        assert!((set - Point2::from(asked)).norm() < 4.0, "{set}");
+    }
+    let shown = screen.shown();
+    assert!(shown.contains("bare, wood with 2 tips"), "{shown}");
+    assert!(
+        shown.contains('w') && shown.contains('#') && shown.contains('*'),
+        "{shown}"
+    );
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    assert_eq!(screen.sheet.accepted(), screen.puppet.looked[2..]);
+}
+
+#[test]
+fn undo_takes_strokes_back_and_needs_no_new_look() {
+    let mut screen = Screen::new(80, 24);
+    screen.stroke('b', &TRUNK);
+    screen.stroke('b', &[[80.0, 50.0], [110.0, 15.0]]);
+    let looks = screen.puppet.looked.len();
+    assert_eq!(screen.press(KeyCode::Char('u')), Next::Stay);
+    assert!(screen.shown().contains("Undone"), "{}", screen.shown());
+    assert_eq!(screen.puppet.looked.len(), looks);
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    assert_eq!(screen.sheet.accepted()[0].branches_px.len(), 1);
+    let mut screen = Screen::new(80, 24);
+    screen.press(KeyCode::Char('u'));
+    assert!(
+        screen.shown().contains("nothing to undo"),
+        "{}",
+        screen.shown()
+    );
+}
+
+#[test]
+fn a_second_tree_begins_where_the_first_is_whole() {
+    let mut screen = Screen::new(80, 24);
+    screen.press(KeyCode::Char('n'));
+    assert!(
+        screen.shown().contains("before the next"),
+        "{}",
+        screen.shown()
+    );
+    screen.stroke('c', &CROWN);
+    screen.stroke('b', &TRUNK);
+    screen.press(KeyCode::Char('n'));
+    assert!(screen.shown().contains("tree 2"), "{}", screen.shown());
+    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
+    screen.stroke('c', &CROWN);
+    screen.stroke('b', &TRUNK);
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    assert_eq!(screen.sheet.accepted().len(), 2);
+}
+
+#[test]
+fn the_screen_leaves_by_its_keys_and_draws_in_any_window() {
+    for (width, height) in [(80, 24), (120, 40), (1, 1), (20, 3)] {
+        let mut screen = Screen::new(width, height);
+        if width >= 80 {
+            screen.stroke('c', &CROWN);
+            screen.stroke('b', &TRUNK);
+            screen.sheet.state.unsay();
+            screen.draw();
+            insta::assert_snapshot!(format!("photo_{width}x{height}"), screen.terminal.backend());
+        }
+        assert_eq!(screen.press(KeyCode::Char('q')), Next::Quit);
+        let with_control = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
+        assert_eq!(screen.event(&Event::Key(with_control)), Next::Quit);
+    }
+}
