@@ -22,6 +22,7 @@ mod leaves;
 mod pose_tracker;
 mod refiner;
 mod reshape;
+mod scanned;
 #[cfg(feature = "opencv")]
 mod seeds;
 mod seen;
@@ -41,6 +42,7 @@ pub use grown::stand_grown;
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, push_terms, reshape};
+pub use scanned::{ScaledTree, stand_scanned};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;

@@ -3,12 +3,15 @@
 //! A sketch ([`read_sketch`]) is a set of strokes. Where they meet they are joined to a flat tree
 //! ([`joined`]), which is stood up in space as a captured one is (Li 2011 sect. 6 and fig. 9).
 //!
-//! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_crown`] reads the
-//! line that a user draws round a crown.
+//! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_crown`] reads
+//! the line that a user draws round a crown.
+//!
+//! [`read_cloud`] reads the points of a scan.
 //!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
 //! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
 
+mod cloud;
 mod crown;
 mod cylinders;
 mod error;
@@ -22,6 +25,7 @@ mod model_file;
 mod model_tree;
 mod obj;
 mod ply;
+mod ply_rows;
 mod sketch;
 mod sketch_json;
 mod svg;
@@ -30,6 +34,7 @@ mod svg_place;
 mod traced;
 mod treefile;
 
+pub use cloud::{CloudFormat, CloudRead, read_cloud};
 pub use crown::{Crown, read_crown};
 pub use error::ImportError;
 pub use flat_tree::FlatTree;

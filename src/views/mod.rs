@@ -10,6 +10,8 @@ mod loops;
 mod offspring;
 mod photo;
 mod prepared;
+mod scan_film;
+mod scanned;
 mod studio;
 mod tables;
 mod write;
@@ -23,6 +25,8 @@ pub use offspring::{
 };
 pub use photo::{PhotoDepth, PhotoGrowth, PhotoParts, PhotoTree, photo_defaults};
 pub use prepared::{PreparedTree, TreeOptions};
+pub use scan_film::{register_film, sway_on_scan};
+pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;
 pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};
