@@ -292,6 +292,26 @@ def draw_branches(draw, document):
             draw.line(ends, fill=colours[node["kind"]], width=max(3, round(2 * float(node["radius"]))))
 
 
+def cloud(ply, document, side, out):
+    """The points of a scan from the front, in the picture of its tree; what lies on the ground is left out."""
+    import numpy as np
+
+    raw, side = Path(ply).read_bytes(), int(side)
+    points = np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], "<f8").reshape(-1, 3)
+    note = json.loads((Path(document) / "capture.json").read_text())
+    points = points - note["scan"]["foot_m"]
+    points = points[points[:, 2] > 0.1]
+    size = max(note["source"]["width"], note["source"]["height"])
+    scale = side / (size * note["model"]["metres_per_px"])
+    top = points[:, 2].max()
+    u = (side / 2 + scale * (points[:, 0] - (points[:, 0].min() + points[:, 0].max()) / 2)).astype(int).clip(0, side - 1)
+    v = (0.05 * side + scale * (top - points[:, 2])).astype(int).clip(0, side - 1)
+    dark = np.zeros((side, side))
+    np.add.at(dark, (v, u), 1)
+    grey = 255 * np.exp(-dark / 4)
+    Image.fromarray(grey.astype(np.uint8)).convert("RGB").save(out)
+
+
 def draw_strokes(draw, element, scale, width):
     width = float(element.get("stroke-width", width))
     line = stroke_of(element)
@@ -396,7 +416,7 @@ def dirichlet(shares):
 if __name__ == "__main__":
     commands = {
         "terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5), "drawing": (drawing, 3),
-        "photo": (photo, 5), "triangles": (triangles, 3),
+        "photo": (photo, 5), "cloud": (cloud, 4), "triangles": (triangles, 3),
     }
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, sketch, photo, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# wind, grown, sketch, photo, cloud, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
 # clip) go to out/;
 # without CLIPS the second is of a film made anew, for which, and for `grown` and `photo`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
@@ -280,6 +280,20 @@ column() {
     told "$out"
 }
 
+# A scan beside its tree from the front, and the tree from the side.
+cloud() {
+    local seed=41001
+    "$python" benches/made_clouds.py "$work" cloud "$seed" || fail "no cloud could be made; see the head of benches/made_clouds.py"
+    "$arborcam" cloud "$work/cloud/cloud.ply" --out "$work/scanned" 2>"$work/cloud.log" ||
+        fail "cloud failed: $(tail -n 1 "$work/cloud.log")"
+    "$python" scripts/pictures.py cloud "$work/cloud/cloud.ply" "$work/scanned" 256 "$work/cloud-points.png"
+    for view in front side; do
+        "$arborcam" render "$work/scanned" --size 256x256 --view "$view" --out "$work/scanned-$view.png" 2>"$work/render.log" ||
+            fail "render of the scan failed: $(cat "$work/render.log")"
+    done
+    row "$to/cloud.png" "$work"/{cloud-points,scanned-front,scanned-side}.png
+}
+
 # Forty trees of eight on a hill.
 forest() {
     local tree=winter
@@ -402,6 +416,7 @@ wanted wind && wind
 wanted grown && grown
 wanted sketch && sketch
 wanted photo && photo
+wanted cloud && cloud
 wanted forest && forest
 wanted points && points
 wanted terminal && terminal

@@ -5,15 +5,16 @@
 //! # The way of the data
 //!
 //! ```text
-//! source ──RawFrame──▶ decode ──Frame──▶ outline ─▶ track ──TrackSet──▶ hierarchy ──MotionHierarchy──┐
-//!                                                     │    once enough motion has accumulated         ▼
-//!                                                     │                          skeleton (2D) ─▶ shape (3D)
-//!                                                     │                                               │ Skeleton
-//!                                                     ├──────TrackSet, every frame──────▶ motion ◀────┤
-//!                                                     │                                     │ Pose      │
-//!                                                     └──────TrackSet, now and then────▶ dynamics ◀───┘
-//!                                                                                           │ SwayNow
-//!                                                     terminal UI, --stream, capture folder ◀
+//! source ──RawFrame──▶ decode ──Frame──▶ outline ─▶ track ──TrackSet──▶ hierarchy
+//! ──MotionHierarchy──┐                                                     │    once enough motion
+//! has accumulated         ▼                                                     │
+//! skeleton (2D) ─▶ shape (3D)                                                     │
+//! │ Skeleton                                                     ├──────TrackSet, every
+//! frame──────▶ motion ◀────┤                                                     │
+//! │ Pose      │                                                     └──────TrackSet, now and
+//! then────▶ dynamics ◀───┘
+//! │ SwayNow                                                     terminal UI, --stream, capture
+//! folder ◀
 //! ```
 //!
 //! [`pipeline`] is that picture as code, in four stages: decode, a front end (frame to tracks), a
@@ -26,8 +27,8 @@
 //! · `track` points followed · [`hierarchy`] which points move together · `wood` which pixels are
 //! wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
 //! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
-//! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches and
-//! modelled trees ·
+//! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches,
+//! modelled trees and point clouds · [`cloud`] trees in point clouds ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
 //! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
@@ -54,6 +55,7 @@ pub mod cancel;
 pub mod caught;
 #[cfg(feature = "terminal")]
 pub mod cli;
+pub mod cloud;
 pub mod config;
 #[cfg(feature = "terminal")]
 pub mod doctor;

@@ -24,6 +24,7 @@ mod photograph;
 mod pose_tracker;
 mod refiner;
 mod reshape;
+mod scanned;
 #[cfg(feature = "opencv")]
 mod seeds;
 mod seen;
@@ -45,6 +46,7 @@ pub use photograph::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, grown_terms, reshape};
+pub use scanned::{ScaledTree, stand_scanned};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;

@@ -47,8 +47,9 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "grow",
         &["model", "config", "signal", "skeleton::Node2d", "random"],
     ),
-    // Sketches and modelled trees become flat trees.
-    ("import", &["model", "signal", "files"]),
+    // Sketches and modelled trees become flat trees. Readers of scans panic on damaged files.
+    ("import", &["model", "signal", "files", "caught"]),
+    ("cloud", &["model", "signal"]),
     // Sub-branches, which only their own frequency tells, and modes.
     (
         "solve",
@@ -85,6 +86,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "random",
             // The branches that a photograph shows become a flat tree as drawn ones do.
             "import",
+            // A scanned tree becomes a skeleton.
+            "cloud",
         ],
     ),
     ("recording", &["model"]),
@@ -98,8 +101,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "geometry::FoliageGroup",
         ],
     ),
-    // `capture.json` holds the whole configuration and what the push has achieved. Poses are read by
-    // the rule by which they were made, the outline as a file of its own would be, the points as
+    // `capture.json` holds the whole configuration and what the push has achieved. Poses are read
+    // by the rule by which they were made, the outline as a file of its own would be, the points as
     // the sway is told from them.
     (
         "document",
@@ -124,6 +127,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "ffmpeg",
             "document",
             "geometry",
+            // Cylinders are pieces of limbs.
+            "shape::Limb",
             "dynamics::angle_to_parent_deg",
         ],
     ),
@@ -132,7 +137,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         "views",
         &[
             "model", "config", "files", "document", "export", "pipeline", "shape", "geometry",
-            "draw", "signal", "grow", "animate", "random", "import",
+            "draw", "signal", "grow", "animate", "random", "import", "cloud",
         ],
     ),
     // Told from what the sway was told from, and drawn beside it; its table for statistics is
@@ -205,6 +210,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "export",
             "views",
             "animate",
+            "cloud",
             "draw",
             "grow",
             "import",
@@ -238,6 +244,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("roxmltree::", &["import"]),
     ("svgtypes::", &["import"]),
     ("kurbo::", &["import"]),
+    ("las::", &["import"]),
+    ("e57::", &["import"]),
     ("flate2::", &["export"]),
     ("base64::", &["export"]),
     ("opencv::", &["track", "outline", "wood"]),

@@ -4,8 +4,9 @@
 #[path = "support/chance.rs"]
 mod chance;
 
+use arborcam::cloud::{CloudOptions, tree_of_cloud};
 use arborcam::config::Config;
-use arborcam::import::{FlatModel, joined, read_model, read_sketch};
+use arborcam::import::{CloudFormat, FlatModel, joined, read_cloud, read_model, read_sketch};
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
 use chance::Chance;
@@ -148,4 +149,32 @@ fn no_drawing_and_no_model_brings_the_readers_down() {
         }
     }
     assert!(trees > 30, "only {trees} trees: this shows nothing");
+}
+
+/// LAS, PLY, PCD and text: an end, one line, and never more than was there.
+#[test]
+fn no_cloud_brings_the_readers_down() {
+    let mut read = 0;
+    for seed in seeds("cloud") {
+        let format = match seed.first() {
+            Some(b'L') => CloudFormat::Las,
+            Some(b'p') => CloudFormat::Ply,
+            Some(b'V') => CloudFormat::Pcd,
+            _ => CloudFormat::Text,
+        };
+        each(&seed, |bytes| {
+            match read_cloud(Cursor::new(bytes.to_vec()), format, None) {
+                Ok(found) => {
+                    read += 1;
+                    assert!(found.cloud.points.len() <= bytes.len());
+                    let _ = tree_of_cloud(&found.cloud, CloudOptions::default());
+                }
+                Err(e) => assert!(!e.to_string().contains('\n'), "one line"),
+            }
+        });
+    }
+    assert!(
+        read > 200,
+        "hardly anything was ever read: this shows nothing"
+    );
 }

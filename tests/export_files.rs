@@ -181,6 +181,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         leaves: None,
         bark: None,
         masks: None,
+        scan: None,
         build: None,
         refinement: None,
         quality: Quality {

@@ -27,11 +27,12 @@ pub struct ExportArgs {
     dir: PathBuf,
     /// Format. glb: mesh and motion in one file; gltf: the same as .gltf and .bin; csv: a folder
     /// with the tables and the wood as cylinders; obj and ply: the tree at rest; html: a page for a
-    /// browser, in one file.
+    /// browser, in one file; qsm: the wood as cylinders for SimpleForest, aRchi and rTwig, with
+    /// frequency and damping; treefile: the same for RayCloudTools.
     #[arg(long, value_name = "FORMAT")]
     format: Format,
     /// File to write, for csv a folder. It must not exist, and appears when it is complete. `-`:
-    /// standard output (glb, html, ply).
+    /// standard output (glb, html, ply, qsm, treefile).
     #[arg(long, value_name = "PATH")]
     out: PathBuf,
     /// Largest deviation of a node when keys of the animation are left out, px in the front view;
@@ -72,7 +73,10 @@ impl ExportArgs {
             unused::note("--lods", "only glb and gltf hold levels of detail");
         }
         if self.tolerance_px != KEY_TOLERANCE_PX
-            && matches!(self.format, Format::Csv | Format::Obj | Format::Ply)
+            && matches!(
+                self.format,
+                Format::Csv | Format::Obj | Format::Ply | Format::Qsm | Format::Treefile
+            )
         {
             unused::note("--tolerance-px", "this format holds no keys");
         }
@@ -87,6 +91,8 @@ enum Format {
     Csv,
     Obj,
     Ply,
+    Qsm,
+    Treefile,
 }
 
 /// Parses `--height`, m.
@@ -130,6 +136,9 @@ pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
     if args.format == Format::Csv {
         return write_tables(args, &tree, &stop);
     }
+    if matches!(args.format, Format::Qsm | Format::Treefile) {
+        return write_qsm(args.format, &tree, &target, &stop);
+    }
     let model = Model {
         tolerance_px: args.tolerance_px,
         ..tree.model()
@@ -167,7 +176,7 @@ fn files(
         Format::Obj => return obj_files(&tree.dressed, &stem, metres_per_px, &about),
         Format::Html => tree.page(model, &stem)?,
         Format::Ply => ply(&tree.dressed, metres_per_px, &about)?,
-        Format::Glb | Format::Csv => glb(model)?.0,
+        _ => glb(model)?.0,
     };
     Ok(vec![(target.name(), bytes)])
 }
@@ -185,6 +194,33 @@ fn write_tables(args: &ExportArgs, tree: &PreparedTree, stop: &Stop) -> Result<(
         written.dir.display(),
         written.cylinders
     ));
+    Ok(())
+}
+
+/// Writes the wood as cylinders, and prints what each order of branches sums up to.
+fn write_qsm(
+    format: Format,
+    tree: &PreparedTree,
+    target: &Target,
+    stop: &Stop,
+) -> Result<(), CommandError> {
+    let qsm = tree.qsm();
+    let bytes = match format {
+        Format::Treefile => qsm.treefile().into_bytes(),
+        _ => qsm.table(Vec::new())?,
+    };
+    target.write(vec![(target.name(), bytes)], stop)?;
+    let unit = if tree.config.export.metres_per_px > 0.0 {
+        "m"
+    } else {
+        "px"
+    };
+    for (order, sum) in qsm.by_order().iter().enumerate() {
+        let (branches, length, volume) = (sum.branches, sum.length, sum.volume);
+        eprint_line(&format!(
+            "order {order}: {branches} branches, {length:.2} {unit}, {volume:.5} {unit}3"
+        ));
+    }
     Ok(())
 }
 
@@ -206,7 +242,9 @@ impl<'a> Target<'a> {
         let shown = args.out.display();
         if args.out.as_os_str() == STDOUT {
             return match args.format {
-                Format::Glb | Format::Html | Format::Ply => Ok(Self::Stdout),
+                Format::Glb | Format::Html | Format::Ply | Format::Qsm | Format::Treefile => {
+                    Ok(Self::Stdout)
+                }
                 _ => bad_usage("--out -: this format is more than one file; give a path".into()),
             };
         }
@@ -218,9 +256,7 @@ impl<'a> Target<'a> {
         let ending = match args.format {
             Format::Gltf => "gltf",
             Format::Obj => "obj",
-            Format::Glb | Format::Html | Format::Csv | Format::Ply => {
-                return Ok(Self::File(&args.out));
-            }
+            _ => return Ok(Self::File(&args.out)),
         };
         // The other files are named after it.
         if args

@@ -4,6 +4,7 @@ mod analyze;
 mod animate;
 mod camera;
 mod capture;
+mod cloud;
 mod command_error;
 mod common;
 mod devices;
@@ -74,6 +75,8 @@ enum Command {
     Sketch(sketch::SketchArgs),
     /// Make a tree from one photograph, along strokes that are drawn on it.
     Photo(photo::PhotoArgs),
+    /// Make a tree from a point cloud (.las, .laz, .e57, .ply, .pcd, .xyz).
+    Cloud(cloud::CloudArgs),
     /// Note species, site, wind and the like on a capture, or print what is noted on it.
     Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
@@ -109,6 +112,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Grow(args) => grow::run(args),
         Command::Sketch(args) => sketch::run(args),
         Command::Photo(args) => photo::run(args),
+        Command::Cloud(args) => cloud::run(args),
         Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),

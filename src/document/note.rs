@@ -49,6 +49,9 @@ pub struct CaptureNote {
     pub leaves: Option<LeavesNote>,
     /// `None` where no wood was seen.
     pub masks: Option<MasksNote>,
+    /// `None` but for trees of point clouds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scan: Option<ScanNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
@@ -79,6 +82,43 @@ impl Default for Software {
             version: env!("CARGO_PKG_VERSION").into(),
         }
     }
+}
+
+/// What a point cloud showed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ScanNote {
+    /// The tree's foot in the axes of the cloud, z up, m.
+    pub foot_m: [f64; 3],
+    pub points: u64,
+    /// Of these the points of the ground, of noise, and of what does not hang together with the
+    /// tree.
+    pub ground_points: u64,
+    pub noise_points: u64,
+    pub apart_points: u64,
+    /// Side of the cells in which points were taken for one, m.
+    pub cell_m: f64,
+    /// Standard deviation of the points off thick wood, m; 0 where there is none.
+    pub noise_m: f64,
+    /// Radius of the last twigs, m.
+    pub twig_radius_m: f64,
+    /// The film that was laid on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub film: Option<ScanFilmNote>,
+}
+
+/// How a film lies on a point cloud.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ScanFilmNote {
+    /// From the cloud's x axis to the right of the picture, about its z axis.
+    pub turn_deg: f64,
+    pub roll_deg: f64,
+    pub px_per_metre: f64,
+    /// What it misses lines or pairs of places by, as a share of the tree's height.
+    pub miss: f64,
+    /// The same from the best other side of the tree; `null` where pairs were given.
+    pub other_side_miss: Option<f64>,
+    /// Pieces of branches that carry a filmed frequency.
+    pub branches: u64,
 }
 
 /// Where the frames came from.
@@ -364,6 +404,7 @@ impl CaptureNote {
             bark: None,
             leaves: None,
             masks: None,
+            scan: None,
             build: None,
             refinement: None,
             quality: Quality::default(),

@@ -18,6 +18,7 @@ mod html_data;
 mod joints;
 mod motion_modes;
 pub mod picture;
+pub mod qsm;
 mod skinning;
 pub mod still;
 pub mod sway;

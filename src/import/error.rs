@@ -12,6 +12,9 @@ pub enum ImportError {
     /// It uses something of its format that is not read.
     #[error("{what}; {instead}")]
     Unsupported { what: String, instead: String },
+    /// Its bytes cannot be read.
+    #[error("it cannot be read: {why}; give another file")]
+    Unreadable { why: String },
     #[error("it holds no strokes; draw the trunk and the branches as lines or paths")]
     NoStrokes,
     #[error("it holds no crown; draw one closed line round it, and mark it `crown`")]
@@ -59,6 +62,14 @@ impl ImportError {
     pub(super) fn bad_format(what: impl ToString) -> Self {
         Self::BadFormat {
             what: what.to_string().replace('\n', " "),
+        }
+    }
+
+    /// Its bytes cannot be read; one that ends too early is damaged.
+    pub(super) fn unreadable(e: &std::io::Error) -> Self {
+        match e.kind() {
+            std::io::ErrorKind::UnexpectedEof => Self::bad_format("it is cut off"),
+            _ => Self::Unreadable { why: e.to_string() },
         }
     }
 

@@ -6,9 +6,12 @@
 //! The branches that a photograph shows are such strokes, too ([`traced`]); [`read_strokes`] reads the
 //! lines that a user draws round a crown and along branches.
 //!
+//! [`read_cloud`] reads the points of a scan.
+//!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
 //! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
 
+mod cloud;
 mod cylinders;
 mod error;
 mod flat_tree;
@@ -21,6 +24,7 @@ mod model_file;
 mod model_tree;
 mod obj;
 mod ply;
+mod ply_rows;
 mod sketch;
 mod sketch_json;
 mod svg;
@@ -29,6 +33,7 @@ mod svg_place;
 mod traced;
 mod treefile;
 
+pub use cloud::{CloudFormat, CloudRead, read_cloud};
 pub use error::ImportError;
 pub use flat_tree::FlatTree;
 pub use flatten::FlatModel;

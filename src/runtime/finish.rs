@@ -384,6 +384,7 @@ pub(super) fn describe(
             time_s: p.time_s,
         }),
         leaves: None,
+        scan: None,
         bark: tree.and_then(bark_of).map(|_| BarkNote {
             file: BARK_FILE.into(),
         }),

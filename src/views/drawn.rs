@@ -5,7 +5,7 @@ use crate::config::{Config, Leader};
 use crate::document::Document;
 use crate::document::note::{CaptureNote, ModelNote, OutlineNote, Source};
 use crate::import::FlatTree;
-use crate::model::{Outline, Pose, Skeleton};
+use crate::model::{Outline, Pose, Skeleton, Swaying};
 use crate::pipeline::{MOST_RESHAPED, stand_drawn};
 use std::path::{Path, PathBuf};
 
@@ -17,8 +17,8 @@ pub struct DrawnTree {
 }
 
 impl DrawnTree {
-    /// The tree `flat` within `region`. A trunk that is marked is neither copied nor pushed (Li 2011
-    /// sect. 6). `name` says where it is from.
+    /// The tree `flat` within `region`. A trunk that is marked is neither copied nor pushed (Li
+    /// 2011 sect. 6). `name` says where it is from.
     ///
     /// # Errors
     /// It has too many branches.
@@ -46,6 +46,15 @@ impl DrawnTree {
     /// # Errors
     /// `dir` is there already, or a file cannot be written.
     pub fn write(self, dir: &Path) -> Result<PathBuf, PrepareError> {
+        self.write_swaying(dir, &[])
+    }
+
+    /// The same with the sway of its nodes, by node index.
+    pub(super) fn write_swaying(
+        self,
+        dir: &Path,
+        sway: &[Swaying],
+    ) -> Result<PathBuf, PrepareError> {
         let draft = Draft {
             note: self.note,
             skeleton: &self.skeleton,
@@ -55,7 +64,7 @@ impl DrawnTree {
             poses: Vec::new(),
             pose_in_picture: None,
         };
-        write_document(dir, draft, &[])
+        write_document(dir, draft, sway)
     }
 
     /// The document that would be read back, with `poses` as its motion.
@@ -70,7 +79,12 @@ impl DrawnTree {
 }
 
 /// What `capture.json` says of a tree that was not filmed.
-fn note(name: String, skeleton: &Skeleton, region: &Outline, config: Config) -> CaptureNote {
+pub(super) fn note(
+    name: String,
+    skeleton: &Skeleton,
+    region: &Outline,
+    config: Config,
+) -> CaptureNote {
     let source = Source {
         name,
         width: region.size.width,

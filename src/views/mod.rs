@@ -13,6 +13,8 @@ mod photo;
 #[cfg(feature = "opencv")]
 mod photo_forest;
 mod prepared;
+mod scan_film;
+mod scanned;
 mod studio;
 mod tables;
 mod write;
@@ -32,6 +34,8 @@ pub use photo::{
 #[cfg(feature = "opencv")]
 pub use photo_forest::{StandingPlaces, photo_forest};
 pub use prepared::{PreparedTree, TreeOptions};
+pub use scan_film::{register_film, sway_on_scan};
+pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;
 pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};

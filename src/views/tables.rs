@@ -5,9 +5,11 @@ use crate::document::{
     CAMERA_FILE, LEFT_OUT_FILE, MODES_FILE, MotionCsv, TRACKS_FILE, nodes, tracks_of,
 };
 use crate::export::cylinders::cylinders;
+use crate::export::qsm::Qsm;
 use crate::files::{OutputFolder, WriteError};
 use crate::geometry::cylinders_by_branch;
 use crate::model::NodeName;
+use nalgebra::Point3;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -54,6 +56,24 @@ impl PreparedTree {
             cylinders: rows.len(),
             film: self.document.has_motion(),
         })
+    }
+
+    /// The wood as the tools of quantitative structure models have it; of a scanned tree where it
+    /// stands in the scan.
+    pub fn qsm(&self) -> Qsm {
+        let scan = self
+            .document
+            .note
+            .scan
+            .filter(|_| self.config.export.metres_per_px > 0.0);
+        Qsm::new(
+            &cylinders_by_branch(&self.dressed.limbs, &self.skeleton),
+            &self.dressed.limbs,
+            &self.skeleton,
+            &self.sway,
+            self.config.export.metres_per_px,
+            scan.map_or(Point3::origin(), |scan| scan.foot_m.into()),
+        )
     }
 
     /// Whether the document's tables are those of this tree.

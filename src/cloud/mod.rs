@@ -1,0 +1,318 @@
+//! Point clouds to trees.
+//!
+//! [`tree_of_cloud`] is the whole way: ground and noise off, points thinned, joined to their
+//! neighbours; the foot of the trunk; middle lines by the shortest ways from there ([`levels`]) or
+//! by space colonisation ([`colonise`]); branches that hardly stand out pruned; radii by circles
+//! and tapers ([`radius`]).
+
+mod circle;
+mod colonise;
+mod error;
+mod foot;
+mod graph;
+mod grid;
+mod ground;
+mod levels;
+mod paths;
+mod radius;
+mod raw_tree;
+mod register;
+mod thin;
+mod tree;
+
+pub use error::CloudError;
+pub use register::{PlacePair, Registration, WoodPiece, by_lines, by_pairs};
+pub use tree::{CloudFigures, CloudNode, CloudTree};
+
+use crate::model::PointCloud;
+use crate::signal::median;
+use graph::Graph;
+use ground::Ground;
+use nalgebra::{Point3, Vector3};
+use paths::Path;
+use thin::Thinned;
+
+/// Points that a tree takes at least.
+const LEAST_POINTS: usize = 100;
+/// Points that lie farther off than the size of the cloud without the outermost of them, on both
+/// sides of each axis, are no part of the tree.
+const OUTERMOST: f64 = 0.001;
+/// Cells in which points are one, in the height of the tree at first; larger by this factor until
+/// there are no more points than that.
+const CELLS_IN_HEIGHT: f32 = 700.0;
+const LARGER: f32 = 1.2;
+const MOST_THINNED: usize = 150_000;
+/// Points are neighbours up to so many cells apart; gaps are led over up to this share of the
+/// tree's height.
+const REACH_CELLS: f32 = 1.8;
+const GAP_SHARE: f32 = 0.1;
+/// Of a tree no more of the points than this share do not hang together with its foot.
+const MOST_APART: f64 = 0.3;
+/// Length of the stretches of the way along the wood, cells.
+const STRETCH_CELLS: f32 = 3.0;
+/// A twig stands out of its branch by so many cells.
+const TWIG_CELLS: f64 = 3.0;
+/// Forks on one way from the foot, and branches of a tree: of more only the longer ones are kept.
+/// Levels are counted in a byte, and a model has as many joints as two bytes count.
+const MOST_FORKS: usize = 250;
+const MOST_BRANCHES: usize = 4000;
+/// A tree whose lowest wood is farther above the ground than this share of its height has no trunk.
+const TRUNKLESS: f32 = 0.25;
+/// Heights of trees, m.
+const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.05..=200.0;
+
+/// How the middle lines are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CloudMethod {
+    /// Along the shortest ways from the foot.
+    #[default]
+    Paths,
+    /// Space colonisation (Runions et al. 2007).
+    Colonisation,
+}
+
+/// What may be chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CloudOptions {
+    pub method: CloudMethod,
+    /// Radius of the last twigs where it is known, m.
+    pub twig_radius_m: Option<f64>,
+}
+
+/// The tree in a cloud.
+///
+/// # Errors
+/// There are too few points, they stand for no tree or for several, or the trunk is missing.
+pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudTree, CloudError> {
+    let mut figures = CloudFigures {
+        points: cloud.points.len(),
+        ..CloudFigures::default()
+    };
+    let standing = Standing::of(&cloud.points, &mut figures)?;
+    let height = standing.height;
+    let (thinned, cell) = thinned(&standing, &mut figures)?;
+    let points = &thinned.points;
+    let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * height);
+    let foot = foot::find(&standing.above_ground(points), &graph, height, cell)?;
+    let ways = graph.shortest_ways(&foot);
+    figures.apart = ways.length.iter().filter(|way| way.is_infinite()).count();
+    if figures.apart as f64 > MOST_APART * points.len() as f64 {
+        let share_percent = 100.0 * figures.apart as f64 / points.len() as f64;
+        return Err(CloudError::Apart { share_percent });
+    }
+    let base = standing.foot_below(points, &foot);
+    let raw = match options.method {
+        CloudMethod::Paths => levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell),
+        CloudMethod::Colonisation => colonise::colonise(points, base, cell),
+    };
+    let mut paths = raw.paths();
+    let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());
+    radius::measure(&mut paths, &detail);
+    let mut least = TWIG_CELLS * f64::from(cell);
+    paths::prune(&mut paths, least);
+    while paths::forks_on_one_way(&paths) > MOST_FORKS || paths.len() > MOST_BRANCHES {
+        least *= f64::from(LARGER);
+        paths::prune(&mut paths, least);
+    }
+    reach_tips(&mut paths, points);
+    let noise = radius::measure(&mut paths, &detail);
+    paths::smooth(&mut paths);
+    paths::set_joints(&mut paths);
+    stand_on(&mut paths, base);
+    figures.noise_m = noise;
+    figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
+    radius::assign(&mut paths, figures.twig_radius_m);
+    let nodes = tree::assemble(&paths, f64::from(cell));
+    let Some(first) = nodes.first() else {
+        return Err(CloudError::NoTree);
+    };
+    let highest = nodes
+        .iter()
+        .map(|n| n.position.z)
+        .fold(f64::NEG_INFINITY, f64::max);
+    figures.height_m = highest - first.position.z;
+    if !HEIGHTS_M.contains(&figures.height_m) {
+        return Err(CloudError::OddSize {
+            height_m: figures.height_m,
+        });
+    }
+    Ok(CloudTree { nodes, figures })
+}
+
+/// The points that stand on the ground.
+struct Standing {
+    points: Vec<Point3<f32>>,
+    ground: Option<Ground>,
+    height: f32,
+}
+
+impl Standing {
+    fn of(all: &[Point3<f32>], figures: &mut CloudFigures) -> Result<Self, CloudError> {
+        if all.len() < LEAST_POINTS {
+            return Err(CloudError::TooFew {
+                points: all.len(),
+                least: LEAST_POINTS,
+            });
+        }
+        let bounds = [0, 1, 2].map(|axis| Extent::of(all, axis));
+        let [wide, deep, height] = bounds.map(|b| b.size);
+        if height <= 0.0 || wide.max(deep) <= 0.0 {
+            return Err(CloudError::Flat);
+        }
+        let is_near = |p: &Point3<f32>| bounds.iter().zip(p.iter()).all(|(b, x)| b.holds(*x));
+        let mut points: Vec<Point3<f32>> = all.iter().copied().filter(is_near).collect();
+        figures.noise = all.len() - points.len();
+        let ground = Ground::of(&points, height);
+        if let Some(ground) = &ground {
+            let before = points.len();
+            points.retain(|p| !ground.holds(p));
+            figures.ground = before - points.len();
+        }
+        if points.len() < LEAST_POINTS {
+            return Err(CloudError::NoTree);
+        }
+        let height = Extent::of(&points, 2).size;
+        if height <= 0.0 {
+            return Err(CloudError::Flat);
+        }
+        Ok(Self {
+            points,
+            ground,
+            height,
+        })
+    }
+
+    /// The points as high as they are above the ground.
+    fn above_ground(&self, points: &[Point3<f32>]) -> Vec<Point3<f32>> {
+        let mut above = points.to_vec();
+        if let Some(ground) = &self.ground {
+            above
+                .iter_mut()
+                .for_each(|p| p.z -= ground.height_at(p.x, p.y));
+        }
+        above
+    }
+
+    /// The foot below the lowest points of the trunk: in their middle, on the ground.
+    fn foot_below(&self, points: &[Point3<f32>], lowest: &[u32]) -> Point3<f64> {
+        let mut sum = Vector3::zeros();
+        lowest
+            .iter()
+            .for_each(|p| sum += points[*p as usize].coords.cast::<f64>());
+        let mut foot = Point3::from(sum / lowest.len().max(1) as f64);
+        foot.z = lowest
+            .iter()
+            .map(|p| f64::from(points[*p as usize].z))
+            .fold(foot.z, f64::min);
+        if let Some(ground) = &self.ground {
+            foot.z = foot
+                .z
+                .min(f64::from(ground.height_at(foot.x as f32, foot.y as f32)));
+        }
+        foot
+    }
+}
+
+/// Where most points lie along an axis.
+#[derive(Clone, Copy, Debug)]
+struct Extent {
+    low: f32,
+    size: f32,
+}
+
+impl Extent {
+    fn of(points: &[Point3<f32>], axis: usize) -> Self {
+        let mut all: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        let off = (OUTERMOST * all.len() as f64) as usize;
+        let last = all.len() - 1 - off;
+        let low = *all.select_nth_unstable_by(off, f32::total_cmp).1;
+        let high = *all.select_nth_unstable_by(last, f32::total_cmp).1;
+        Self {
+            low,
+            size: high - low,
+        }
+    }
+
+    fn holds(&self, x: f32) -> bool {
+        (self.low - self.size..=self.low + 2.0 * self.size).contains(&x)
+    }
+}
+
+/// The standing points thinned and without noise, and the side of their cells.
+fn thinned(standing: &Standing, figures: &mut CloudFigures) -> Result<(Thinned, f32), CloudError> {
+    let mut cell = standing.height / CELLS_IN_HEIGHT;
+    let mut thinned = Thinned::of(&standing.points, cell);
+    while thinned.points.len() > MOST_THINNED {
+        cell *= LARGER;
+        thinned = Thinned::of(&standing.points, cell);
+    }
+    let cell = cell.max(spacing(&thinned.points, cell));
+    let kept = thin::is_no_outlier(&thinned.points, cell);
+    thinned.without(&kept);
+    figures.noise += thinned
+        .of_point
+        .iter()
+        .filter(|of| **of == u32::MAX)
+        .count();
+    figures.cell_m = f64::from(cell);
+    let lowest = thinned
+        .points
+        .iter()
+        .min_by(|a, b| a.z.total_cmp(&b.z))
+        .ok_or(CloudError::NoTree)?;
+    if let Some(ground) = &standing.ground {
+        let gap = lowest.z - ground.height_at(lowest.x, lowest.y);
+        if gap > TRUNKLESS * standing.height {
+            return Err(CloudError::NoTrunk {
+                gap_m: f64::from(gap),
+            });
+        }
+    }
+    Ok((thinned, cell))
+}
+
+/// The median distance of points to the third of their neighbours: of a sparse cloud it is more
+/// than the side of the cells.
+fn spacing(points: &[Point3<f32>], cell: f32) -> f32 {
+    let grid = grid::Grid::new(points, 4.0 * cell);
+    let step = (points.len() / 1000).max(1);
+    let mut thirds: Vec<f64> = Vec::new();
+    for at in points.iter().step_by(step) {
+        let mut near: Vec<f32> = Vec::new();
+        let mut reach = 4.0 * cell;
+        while near.len() < 4 && reach < 1000.0 * cell {
+            near.clear();
+            grid.within(at, reach, |_, square| near.push(square));
+            reach *= 2.0;
+        }
+        near.sort_unstable_by(f32::total_cmp);
+        thirds.extend(near.get(3).map(|square| f64::from(square.sqrt())));
+    }
+    median(thirds, f64::total_cmp).map_or(cell, |third| third as f32)
+}
+
+/// Lets every path end where its last points do.
+fn reach_tips(paths: &mut [Path], points: &[Point3<f32>]) {
+    for path in paths {
+        let last = path.places.len() - 1;
+        if last == 0 {
+            continue;
+        }
+        let along = path.direction(last);
+        let tip = &mut path.places[last];
+        let ahead = tip
+            .points
+            .iter()
+            .map(|p| (points[*p as usize].cast::<f64>() - tip.at).dot(&along));
+        tip.at += along * ahead.fold(0.0, f64::max);
+    }
+}
+
+/// Lets the trunk begin on the ground, below its first place.
+fn stand_on(paths: &mut [Path], base: Point3<f64>) {
+    let Some(trunk) = paths.first_mut() else {
+        return;
+    };
+    let first = &mut trunk.places[0];
+    first.at.z = first.at.z.min(base.z);
+}

@@ -1,0 +1,260 @@
+//! A tree as paths: middle lines from where they leave another one to their tips.
+
+use nalgebra::{Point3, Vector3};
+
+/// Places to both sides that the direction of a path is taken from.
+const DIRECTION_REACH: usize = 3;
+/// Places that a side path's first direction is taken from.
+const DEPARTURE_PLACES: usize = 6;
+/// Rounds in which a path is smoothed by the weights 1, 2, 1.
+const SMOOTHINGS: usize = 2;
+/// A side path is kept if its tip stands out of the wood that it leaves by more than this share of
+/// that wood's radius, besides the least length.
+const STANDS_OUT: f64 = 0.5;
+
+/// Which place of which path.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Joint {
+    pub path: usize,
+    pub place: usize,
+}
+
+/// A middle line.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Path {
+    /// Where it leaves another one, earlier in the list; `None` for the trunk.
+    pub on: Option<Joint>,
+    /// From its base to its tip.
+    pub places: Vec<Place>,
+}
+
+/// A place of a path.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Place {
+    pub at: Point3<f64>,
+    /// The thinned points that belong to it.
+    pub points: Vec<u32>,
+    /// Radius as it was measured there, m, where it could be.
+    pub measured: Option<Measured>,
+    /// Radius that it is given, m.
+    pub radius: f64,
+}
+
+/// A radius that points show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Measured {
+    pub radius: f64,
+    /// Standard deviation of the points about the circle, m.
+    pub spread: f64,
+    /// Points that it rests on.
+    pub points: usize,
+    /// Whether a circle was fitted; else it is the points' mean distance from the middle line.
+    pub is_circle: bool,
+}
+
+impl Place {
+    pub fn new(at: Point3<f64>) -> Self {
+        Self {
+            at,
+            points: Vec::new(),
+            measured: None,
+            radius: 0.0,
+        }
+    }
+}
+
+impl Path {
+    /// Its direction at a place; up where it has none.
+    pub fn direction(&self, place: usize) -> Vector3<f64> {
+        let from = place.saturating_sub(DIRECTION_REACH);
+        let to = (place + DIRECTION_REACH).min(self.places.len() - 1);
+        let way = self.places[to].at - self.places[from].at;
+        way.try_normalize(1e-9).unwrap_or_else(Vector3::z)
+    }
+
+    /// Leads the line straight between two places: there its points are those of a fork, and its
+    /// circles none of one limb.
+    fn straighten(&mut self, from: usize, to: usize) {
+        let to = to.min(self.places.len() - 1);
+        if from + 1 >= to {
+            return;
+        }
+        let (begin, way) = (
+            self.places[from].at,
+            self.places[to].at - self.places[from].at,
+        );
+        for k in from + 1..to {
+            let share = (k - from) as f64 / (to - from) as f64;
+            self.places[k].at = begin + way * share;
+            self.places[k].measured = None;
+        }
+    }
+
+    /// Length from a place to the tip.
+    pub fn length_from(&self, place: usize) -> f64 {
+        self.places[place..]
+            .windows(2)
+            .map(|p| (p[1].at - p[0].at).norm())
+            .sum()
+    }
+
+    /// Distance of a point from its line.
+    pub fn distance_to(&self, at: &Point3<f64>) -> Off {
+        let mut best = Off {
+            place: 0,
+            distance: (self.places[0].at - at).norm(),
+        };
+        for (k, ends) in self.places.windows(2).enumerate() {
+            let way = ends[1].at - ends[0].at;
+            let t = ((at - ends[0].at).dot(&way) / way.norm_squared().max(1e-18)).clamp(0.0, 1.0);
+            let distance = (ends[0].at + t * way - at).norm();
+            if distance < best.distance {
+                best = Off {
+                    place: k + usize::from(t > 0.5),
+                    distance,
+                };
+            }
+        }
+        best
+    }
+}
+
+/// How far something is from a path, and at which place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Off {
+    pub place: usize,
+    pub distance: f64,
+}
+
+/// Takes out the paths that hardly leave the wood that they grow from, with all that they carry;
+/// their points fall to the places that they left. `least` is the length that a twig has at least,
+/// m.
+pub(super) fn prune(paths: &mut Vec<Path>, least: f64) {
+    let mut keep = vec![true; paths.len()];
+    for i in 0..paths.len() {
+        let Some(on) = paths[i].on else {
+            continue;
+        };
+        keep[i] = keep[on.path] && {
+            let (parent, own) = (&paths[on.path], &paths[i]);
+            let outs = own.places.iter().map(|p| parent.distance_to(&p.at));
+            outs.into_iter().any(|off| {
+                let radius = radius_near(parent, off.place);
+                off.distance > (1.0 + STANDS_OUT) * radius + least
+            })
+        };
+        if !keep[i] {
+            let points: Vec<u32> = paths[i]
+                .places
+                .iter()
+                .flat_map(|p| p.points.iter().copied())
+                .collect();
+            let into = standing(paths, &keep, on);
+            paths[into.path].places[into.place].points.extend(points);
+        }
+    }
+    retain(paths, &keep);
+}
+
+/// The largest number of forks on a way from the foot to a tip.
+pub(super) fn forks_on_one_way(paths: &[Path]) -> usize {
+    let mut of_path: Vec<Vec<usize>> = paths.iter().map(|_| Vec::new()).collect();
+    for on in paths.iter().filter_map(|p| p.on) {
+        of_path[on.path].push(on.place);
+    }
+    let mut forks_to_base = vec![0; paths.len()];
+    let mut most = 0;
+    for (i, path) in paths.iter().enumerate() {
+        of_path[i].sort_unstable();
+        of_path[i].dedup();
+        if let Some(on) = path.on {
+            let below = of_path[on.path].partition_point(|place| *place <= on.place);
+            forks_to_base[i] = forks_to_base[on.path] + below;
+        }
+        most = most.max(forks_to_base[i] + of_path[i].len());
+    }
+    most
+}
+
+/// The joint on the nearest path below that is kept.
+fn standing(paths: &[Path], keep: &[bool], mut on: Joint) -> Joint {
+    while !keep[on.path] {
+        let Some(below) = paths[on.path].on else {
+            break;
+        };
+        on = below;
+    }
+    on
+}
+
+/// Takes out paths; none that is kept may grow from one that is not.
+fn retain(paths: &mut Vec<Path>, keep: &[bool]) {
+    let mut new_place = Vec::with_capacity(keep.len());
+    let mut next = 0;
+    for keep in keep {
+        new_place.push(next);
+        next += usize::from(*keep);
+    }
+    let mut flags = keep.iter();
+    paths.retain(|_| flags.next() == Some(&true));
+    for path in paths {
+        if let Some(on) = &mut path.on {
+            on.path = new_place[on.path];
+        }
+    }
+}
+
+/// The measured radius nearest to a place, m; 0 where there is none on the path.
+pub(super) fn radius_near(path: &Path, place: usize) -> f64 {
+    let known = path
+        .places
+        .iter()
+        .enumerate()
+        .filter_map(|(k, p)| Some((k.abs_diff(place), p.measured?.radius)));
+    known
+        .min_by_key(|(far, _)| *far)
+        .map_or(0.0, |(_, radius)| radius)
+}
+
+/// Takes the unrest out of the middle lines; their ends stay.
+pub(super) fn smooth(paths: &mut [Path]) {
+    for path in paths {
+        for _ in 0..SMOOTHINGS {
+            let before: Vec<Point3<f64>> = path.places.iter().map(|p| p.at).collect();
+            for (place, around) in path.places.iter_mut().skip(1).zip(before.windows(3)) {
+                place.at = Point3::from(
+                    0.25 * around[0].coords + 0.5 * around[1].coords + 0.25 * around[2].coords,
+                );
+            }
+        }
+    }
+}
+
+/// Lets every side path leave where its own line meets that of its parent: the level sets of a fork
+/// part only where the barks do.
+pub(super) fn set_joints(paths: &mut [Path]) {
+    for i in 0..paths.len() {
+        let Some(on) = paths[i].on else {
+            continue;
+        };
+        let own = &paths[i].places;
+        let last = (DEPARTURE_PLACES - 1).min(own.len() - 1);
+        let Some(along) = (own[last].at - own[0].at).try_normalize(1e-9) else {
+            continue;
+        };
+        let parent = &paths[on.path];
+        // Not farther back than the bark is away, twice.
+        let most = 2.0 * (own[0].at - parent.places[on.place].at).norm();
+        let near = (0..parent.places.len())
+            .filter(|k| (parent.places[*k].at - parent.places[on.place].at).norm() <= most);
+        let off = |k: usize| {
+            let way = parent.places[k].at - own[0].at;
+            // Behind the first place, as the line goes on backwards.
+            (way - along * way.dot(&along).min(0.0)).norm()
+        };
+        let best = near.min_by(|a, b| off(*a).total_cmp(&off(*b)));
+        let place = best.unwrap_or(on.place);
+        paths[i].on = Some(Joint { place, ..on });
+        paths[on.path].straighten(place, on.place + 1);
+    }
+}

@@ -1,0 +1,463 @@
+//! Where the camera of a film stood about a scanned tree.
+//!
+//! A film shows the tree as an orthographic camera does: the scan is turned about the vertical, and
+//! a similarity of the plane (scale, roll, shift) lays it on the picture. Either pairs of places
+//! that a user has found in both give them, or the lines of the wood: from starts all round the
+//! tree, nearest lines are paired and the similarity fitted anew (iterative closest points, Besl &
+//! McKay 1992; the nearest are looked for in place and direction). There is an answer only if lines
+//! lie near each other, and clearly nearer than from any other side.
+
+use crate::signal::{CommonMotion, Pair};
+use nalgebra::{Point2, Point3, Similarity2, UnitComplex, Vector2};
+use std::f64::consts::TAU;
+
+/// Starts round the tree, and the steps about the best of them, radians.
+const STARTS: usize = 48;
+const REFINING_STEPS_RAD: [f64; 4] = [0.06, 0.03, 0.01, 0.003];
+/// Rounds of pairing from each start, and from the best.
+const ROUNDS: usize = 8;
+/// Lines are sampled at so many places in the height of the tree, from the starts and about the
+/// best of them.
+const SAMPLES_IN_HEIGHT: [f64; 2] = [40.0, 150.0];
+/// A line at a right angle counts as so far away, as a share of the height.
+const ACROSS_SHARE: f64 = 0.04;
+/// Of the scan the thickest wood counts, so long as this many times the wood of the film.
+const SCAN_LENGTHS: f64 = 1.6;
+/// Samples that are nearest to their lines count: those of the film, and those of the scan, which
+/// has wood that the film does not show.
+const FILM_SHARE: f64 = 0.85;
+const SCAN_SHARE: f64 = 0.55;
+/// The camera is rolled by no more than this, radians, and the height in the film is that of the
+/// scan within this factor.
+const LARGEST_ROLL: f64 = 0.2;
+const LARGEST_FACTOR: f64 = 1.6;
+/// An answer misses lines by no more than this share of the height, and another side of the tree,
+/// farther off than this angle, by so many times as much at least.
+const LARGEST_MISS: f64 = 0.016;
+const OTHER_SIDE_RAD: f64 = 0.4;
+const LEAST_CONTRAST: f64 = 1.15;
+/// Pairs of places are missed by no more than this share of the height.
+const LARGEST_PAIR_MISS: f64 = 0.03;
+
+/// A straight piece of wood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WoodPiece<P> {
+    pub from: P,
+    pub to: P,
+    pub radius: f64,
+}
+
+/// The same place in the film and in the scan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacePair {
+    /// px, v down.
+    pub film_px: Point2<f64>,
+    /// m, z up.
+    pub scan: Point3<f64>,
+}
+
+/// How a scan lies in the picture of a film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Registration {
+    /// By which the scan is turned about the vertical, so that the picture's right is along x,
+    /// radians.
+    pub turn: f64,
+    /// From there to the picture, x to the right and z up to px with y up.
+    pub to_picture: Similarity2<f64>,
+    /// What it misses lines or pairs by, as a share of the height in the film.
+    pub miss: f64,
+    /// The same from the best other side of the tree, if lines were used.
+    pub other_side_miss: Option<f64>,
+}
+
+impl Registration {
+    /// A place of the scan in the picture, px, y up.
+    pub fn project(&self, at: &Point3<f64>) -> Point2<f64> {
+        self.to_picture * turned(at, self.turn)
+    }
+
+    /// Whether it holds: it misses by little, and no other side of the tree fits nearly as well.
+    pub fn holds(&self) -> bool {
+        match self.other_side_miss {
+            Some(other) => self.miss <= LARGEST_MISS && other >= LEAST_CONTRAST * self.miss,
+            None => self.miss <= LARGEST_PAIR_MISS,
+        }
+    }
+}
+
+/// Seen from a side.
+fn turned(at: &Point3<f64>, turn: f64) -> Point2<f64> {
+    let (sin, cos) = turn.sin_cos();
+    Point2::new(at.x * cos + at.y * sin, at.z)
+}
+
+/// The registration by pairs of places, three at least; `height_px` is that of the tree in the
+/// film. Places of the film have y up here. `None` where they do not say it.
+pub fn by_pairs(pairs: &[PlacePair], height_px: f64) -> Option<Registration> {
+    if pairs.len() < 3 {
+        return None;
+    }
+    let mut best: Option<Registration> = None;
+    let mut steps = vec![TAU / STARTS as f64];
+    steps.extend(REFINING_STEPS_RAD);
+    for (round, step) in steps.into_iter().enumerate() {
+        let middle = best.map_or(0.0, |b| b.turn);
+        let reach = if round == 0 { STARTS as i32 / 2 } else { 5 };
+        for k in -reach..=reach {
+            let turn = middle + f64::from(k) * step;
+            let flat: Vec<Pair> = pairs
+                .iter()
+                .map(|p| Pair {
+                    from_px: turned(&p.scan, turn),
+                    to_px: p.film_px,
+                })
+                .collect();
+            let Some(to_picture) = least_squares(&flat) else {
+                continue;
+            };
+            let squares: f64 = flat
+                .iter()
+                .map(|p| p.miss_px(&to_picture).norm_squared())
+                .sum();
+            let miss = (squares / pairs.len() as f64).sqrt() / height_px;
+            if best.is_none_or(|b| miss < b.miss) {
+                best = Some(Registration {
+                    turn,
+                    to_picture,
+                    miss,
+                    other_side_miss: None,
+                });
+            }
+        }
+    }
+    best
+}
+
+/// The similarity of least squares; `None` where all lie in one place.
+fn least_squares(pairs: &[Pair]) -> Option<Similarity2<f64>> {
+    let count = pairs.len() as f64;
+    let mean = |side: fn(&Pair) -> Point2<f64>| {
+        pairs.iter().map(|p| side(p).coords).sum::<Vector2<f64>>() / count
+    };
+    let (from, to) = (mean(|p| p.from_px), mean(|p| p.to_px));
+    let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
+    for pair in pairs {
+        let (a, b) = (pair.from_px.coords - from, pair.to_px.coords - to);
+        along += a.dot(&b);
+        across += a.perp(&b);
+        square += a.norm_squared();
+    }
+    let scale = along.hypot(across) / square;
+    if !(scale > 0.0 && scale.is_finite()) {
+        return None;
+    }
+    let turn = UnitComplex::new(across.atan2(along));
+    let shift = to - scale * (turn * from);
+    Some(Similarity2::from_parts(shift.into(), turn, scale))
+}
+
+/// A place on a line, and the direction of the line, of length 1.
+#[derive(Clone, Copy, Debug)]
+struct Sample<P, V> {
+    at: P,
+    along: V,
+}
+
+type FilmSample = Sample<Point2<f64>, Vector2<f64>>;
+
+/// The registration by lines: `film` in the picture, px, y up, the foot at the origin; `scan` in
+/// space, m, z up, the foot at the origin. `None` where there is nothing to compare; else it is to
+/// be asked whether it [`holds`](Registration::holds).
+pub fn by_lines(
+    film: &[WoodPiece<Point2<f64>>],
+    scan: &[WoodPiece<Point3<f64>>],
+) -> Option<Registration> {
+    let height_px = film
+        .iter()
+        .map(|p| p.to.y.max(p.from.y))
+        .fold(0.0, f64::max);
+    let height = scan
+        .iter()
+        .map(|p| p.to.z.max(p.from.z))
+        .fold(0.0, f64::max);
+    if height_px <= 0.0 || height <= 0.0 {
+        return None;
+    }
+    let length_px: f64 = film.iter().map(|p| (p.to - p.from).norm()).sum();
+    let start = height_px / height;
+    let scan = thickest(scan, SCAN_LENGTHS * length_px / start);
+    let [lines, fine] = SAMPLES_IN_HEIGHT.map(|samples| Lines {
+        film: film_samples(film, height_px / samples),
+        scan: scan_samples(&scan, height / samples),
+        height_px,
+        start,
+    });
+    if lines.film.len() < 10 || lines.scan.len() < 10 {
+        return None;
+    }
+    let mut all: Vec<Registration> = Vec::new();
+    for k in 0..STARTS {
+        let turn = TAU * k as f64 / STARTS as f64;
+        all.extend(lines.fit(turn, Similarity2::new(Vector2::zeros(), 0.0, start)));
+    }
+    let first = all
+        .iter()
+        .copied()
+        .min_by(|a, b| a.miss.total_cmp(&b.miss))?;
+    let others = all
+        .iter()
+        .filter(|r| apart(r.turn, first.turn) > OTHER_SIDE_RAD);
+    let other = others.copied().min_by(|a, b| a.miss.total_cmp(&b.miss));
+    let other = other.and_then(|o| fine.fit(o.turn, o.to_picture));
+    let mut best = fine.fit(first.turn, first.to_picture)?;
+    for step in REFINING_STEPS_RAD {
+        for k in [-2.0, -1.0, 1.0, 2.0] {
+            let near = fine.fit(best.turn + k * step, best.to_picture);
+            best = near.filter(|n| n.miss < best.miss).unwrap_or(best);
+        }
+    }
+    best.other_side_miss = Some(other.map_or(f64::INFINITY, |o| o.miss));
+    Some(best)
+}
+
+/// The angle between two directions, radians.
+fn apart(a: f64, b: f64) -> f64 {
+    let off = (a - b).rem_euclid(TAU);
+    off.min(TAU - off)
+}
+
+/// The thickest pieces, so many metres together.
+fn thickest(scan: &[WoodPiece<Point3<f64>>], length: f64) -> Vec<WoodPiece<Point3<f64>>> {
+    let mut sorted = scan.to_vec();
+    sorted.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+    let mut left = length;
+    sorted.retain(|p| {
+        left -= (p.to - p.from).norm();
+        left > 0.0
+    });
+    sorted
+}
+
+fn film_samples(pieces: &[WoodPiece<Point2<f64>>], step: f64) -> Vec<FilmSample> {
+    let mut samples = Vec::new();
+    for piece in pieces {
+        let way = piece.to - piece.from;
+        let count = (way.norm() / step).ceil() as usize;
+        let along = way.try_normalize(1e-9).unwrap_or_else(Vector2::y);
+        samples.extend((0..count).map(|k| Sample {
+            at: piece.from + way * ((k as f64 + 0.5) / count as f64),
+            along,
+        }));
+    }
+    samples
+}
+
+fn scan_samples(pieces: &[WoodPiece<Point3<f64>>], step: f64) -> Vec<WoodPiece<Point3<f64>>> {
+    let mut samples = Vec::new();
+    for piece in pieces {
+        let way = piece.to - piece.from;
+        let count = (way.norm() / step).ceil().max(1.0) as usize;
+        for k in 0..count {
+            let [from, to] = [k, k + 1].map(|k| piece.from + way * (k as f64 / count as f64));
+            samples.push(WoodPiece {
+                from,
+                to,
+                radius: piece.radius,
+            });
+        }
+    }
+    samples
+}
+
+/// The lines of both.
+struct Lines {
+    film: Vec<FilmSample>,
+    /// Short pieces.
+    scan: Vec<WoodPiece<Point3<f64>>>,
+    height_px: f64,
+    /// px in a metre if both are as high as each other.
+    start: f64,
+}
+
+/// A sample and its nearest, and how far that is in place and direction.
+#[derive(Clone, Copy, Debug)]
+struct Match {
+    pair: Pair,
+    off: f64,
+}
+
+impl Lines {
+    /// Pairs and fits from one start.
+    fn fit(&self, turn: f64, start: Similarity2<f64>) -> Option<Registration> {
+        let mut to_picture = start;
+        for _ in 0..ROUNDS {
+            let matches = self.matches(turn, &to_picture);
+            let pairs: Vec<Pair> = matches.iter().map(|m| m.pair).collect();
+            // Counted from the present place, as the fit begins without a turn and at scale 1.
+            let change = CommonMotion::of(&pairs)?.motion;
+            to_picture = change * to_picture;
+            let factor = to_picture.scaling() / self.start;
+            if to_picture.isometry.rotation.angle().abs() > LARGEST_ROLL
+                || !(1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
+            {
+                return None;
+            }
+        }
+        let matches = self.matches(turn, &to_picture);
+        let off = matches.iter().map(|m| m.off).sum::<f64>() / matches.len() as f64;
+        Some(Registration {
+            turn,
+            to_picture,
+            miss: off / self.height_px,
+            other_side_miss: None,
+        })
+    }
+
+    /// The film's samples with the nearest of the scan, and the other way round, without those
+    /// farthest off.
+    fn matches(&self, turn: f64, to_picture: &Similarity2<f64>) -> Vec<Match> {
+        let mut scan: Vec<FilmSample> = Vec::with_capacity(self.scan.len());
+        for piece in &self.scan {
+            let [from, to] = [piece.from, piece.to].map(|end| to_picture * turned(&end, turn));
+            let along = (to - from).try_normalize(1e-9).unwrap_or_else(Vector2::y);
+            scan.push(Sample {
+                at: nalgebra::center(&from, &to),
+                along,
+            });
+        }
+        let across = ACROSS_SHARE * self.height_px;
+        let mut matches = nearest(&self.film, &scan, across, FILM_SHARE, |film, scan| Pair {
+            from_px: scan,
+            to_px: film,
+        });
+        matches.extend(nearest(
+            &scan,
+            &self.film,
+            across,
+            SCAN_SHARE,
+            |scan, film| Pair {
+                from_px: scan,
+                to_px: film,
+            },
+        ));
+        matches
+    }
+}
+
+/// For each of some samples the nearest of others; only this share of them, the nearest.
+fn nearest(
+    samples: &[FilmSample],
+    others: &[FilmSample],
+    across: f64,
+    share: f64,
+    pair: fn(Point2<f64>, Point2<f64>) -> Pair,
+) -> Vec<Match> {
+    let mut matches = Vec::with_capacity(samples.len());
+    for own in samples {
+        let mut best = (f64::INFINITY, own.at);
+        for other in others {
+            let turn = own.along.perp(&other.along);
+            let square = (other.at - own.at).norm_squared() + across * across * turn * turn;
+            if square < best.0 {
+                best = (square, other.at);
+            }
+        }
+        matches.push(Match {
+            pair: pair(own.at, best.1),
+            off: best.0.sqrt(),
+        });
+    }
+    matches.sort_by(|a, b| a.off.total_cmp(&b.off));
+    matches.truncate((share * samples.len() as f64).ceil() as usize);
+    matches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An uneven tree: a stem with limbs to all sides.
+    fn scan() -> Vec<WoodPiece<Point3<f64>>> {
+        let mut pieces = vec![WoodPiece {
+            from: Point3::origin(),
+            to: Point3::new(0.3, 0.1, 5.0),
+            radius: 0.1,
+        }];
+        for (k, (height, azimuth, length)) in [
+            (1.5, 0.3, 2.0),
+            (2.2, 2.9, 1.4),
+            (2.9, 4.4, 1.8),
+            (3.5, 1.6, 1.1),
+            (4.0, 5.6, 0.9),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let from = Point3::new(0.06 * height, 0.02 * height, height);
+            let (sin, cos) = f64::sin_cos(azimuth);
+            let to = from + nalgebra::Vector3::new(cos, sin, 0.4 + 0.2 * k as f64) * length;
+            pieces.push(WoodPiece {
+                from,
+                to,
+                radius: 0.05,
+            });
+        }
+        pieces
+    }
+
+    fn filmed(turn: f64, to_picture: Similarity2<f64>) -> Vec<WoodPiece<Point2<f64>>> {
+        let flat = |at: &Point3<f64>| to_picture * turned(at, turn);
+        scan()
+            .iter()
+            .map(|p| WoodPiece {
+                from: flat(&p.from),
+                to: flat(&p.to),
+                radius: 0.0,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_side_from_which_a_tree_was_filmed_is_found() {
+        let truth = Similarity2::new(Vector2::new(3.0, -4.0), 0.03, 60.0);
+        let film = filmed(2.2, truth);
+        let found = by_lines(&film[..5], &scan()).expect("found");
+        assert!(found.holds(), "{found:?}");
+        assert!(apart(found.turn, 2.2) < 0.05, "{found:?}");
+        let top = Point3::new(0.3, 0.1, 5.0);
+        let off = (found.project(&top) - truth * turned(&top, 2.2)).norm();
+        assert!(off < 0.03 * 300.0, "{off}");
+        // Another tree, whose limbs hang to one side: nothing holds.
+        let mut other = film.clone();
+        for (k, piece) in (1..).zip(&mut other[1..]) {
+            piece.to = piece.from + Vector2::new(70.0, -12.0 * f64::from(k));
+        }
+        assert!(by_lines(&other, &scan()).is_none_or(|r| !r.holds()));
+        assert!(by_lines(&[], &scan()).is_none());
+    }
+
+    #[test]
+    fn three_pairs_give_it_and_pairs_that_disagree_do_not() {
+        let truth = Similarity2::new(Vector2::new(30.0, -40.0), -0.05, 80.0);
+        let places = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.5, 3.0],
+            [-0.7, 1.0, 4.0],
+            [0.4, -1.5, 3.5],
+        ]
+        .map(Point3::from);
+        let pair = |at: Point3<f64>| PlacePair {
+            film_px: truth * turned(&at, 1.1),
+            scan: at,
+        };
+        let mut pairs = places.map(pair);
+        let found = by_pairs(&pairs[..3], 320.0).expect("found");
+        assert!(found.holds());
+        let four = by_pairs(&pairs, 320.0).expect("found");
+        assert!(apart(four.turn, 1.1) < 0.01 && four.miss < 1e-3, "{four:?}");
+        pairs[2].film_px.x += 90.0;
+        pairs[1].film_px.y -= 90.0;
+        assert!(!by_pairs(&pairs, 320.0).expect("an answer").holds());
+        assert!(by_pairs(&pairs[..2], 320.0).is_none());
+    }
+}

@@ -1,0 +1,135 @@
+//! The tree that a cloud shows.
+
+use super::paths::{Joint, Path};
+use nalgebra::Point3;
+
+/// Bends are left out where the line stays this near, in the distance of points.
+const STRAIGHT_CELLS: f64 = 0.5;
+/// Between two nodes the radius of the wood is off by at most this share of it.
+const RADIUS_SHARE: f64 = 0.08;
+
+/// A tree in space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CloudTree {
+    /// Parents before children; the first is the foot. Where a branch leaves another one, its first
+    /// node lies on the bark of that.
+    pub nodes: Vec<CloudNode>,
+    pub figures: CloudFigures,
+}
+
+/// The end of a piece of wood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CloudNode {
+    pub parent: Option<usize>,
+    /// m, z up, against the origin of the cloud.
+    pub position: Point3<f64>,
+    /// m.
+    pub radius: f64,
+    /// Whether a circle was fitted there.
+    pub is_measured: bool,
+}
+
+/// What was found on the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CloudFigures {
+    /// Points of the cloud, of the ground, of noise, and of what does not hang together with the
+    /// tree.
+    pub points: usize,
+    pub ground: usize,
+    pub noise: usize,
+    pub apart: usize,
+    /// Side of the cells in which points are one, m.
+    pub cell_m: f64,
+    /// Standard deviation of points off thick wood, m; 0 where there is none.
+    pub noise_m: f64,
+    /// Radius of the last twigs, m.
+    pub twig_radius_m: f64,
+    /// Height of the tree from its foot, m.
+    pub height_m: f64,
+}
+
+/// Puts the paths together; `cell` is the distance of points, m.
+pub(super) fn assemble(paths: &[Path], cell: f64) -> Vec<CloudNode> {
+    let kept = kept_places(paths, STRAIGHT_CELLS * cell);
+    let mut nodes: Vec<CloudNode> = Vec::new();
+    let mut node_of: Vec<Vec<Option<usize>>> = Vec::with_capacity(paths.len());
+    for (path, keep) in paths.iter().zip(&kept) {
+        let mut parent = path.on.and_then(|on| node_at(&node_of, on));
+        if let (Some(on), Some(carrier)) = (path.on, parent) {
+            let carrier = &nodes[carrier];
+            let own = &path.places[0];
+            let way = own.at - carrier.position;
+            let bark = paths[on.path].places[on.place].radius;
+            // A branch that begins inside of what carries it has no other place on its bark.
+            if way.norm() > bark + 0.5 * cell {
+                nodes.push(CloudNode {
+                    parent,
+                    position: carrier.position + way * (bark / way.norm()),
+                    radius: own.radius,
+                    is_measured: false,
+                });
+                parent = Some(nodes.len() - 1);
+            }
+        }
+        let mut of_path = vec![None; path.places.len()];
+        for (k, place) in path.places.iter().enumerate().filter(|(k, _)| keep[*k]) {
+            of_path[k] = Some(nodes.len());
+            nodes.push(CloudNode {
+                parent,
+                position: place.at,
+                radius: place.radius,
+                is_measured: place.measured.is_some_and(|m| m.is_circle),
+            });
+            parent = Some(nodes.len() - 1);
+        }
+        node_of.push(of_path);
+    }
+    nodes
+}
+
+fn node_at(node_of: &[Vec<Option<usize>>], on: Joint) -> Option<usize> {
+    *node_of.get(on.path)?.get(on.place)?
+}
+
+/// Which places of each path become nodes: ends, forks, and what the line and its radius need
+/// (Douglas & Peucker 1973).
+fn kept_places(paths: &[Path], tolerance: f64) -> Vec<Vec<bool>> {
+    let mut kept: Vec<Vec<bool>> = paths.iter().map(|p| vec![false; p.places.len()]).collect();
+    for on in paths.iter().filter_map(|p| p.on) {
+        kept[on.path][on.place] = true;
+    }
+    for (path, keep) in paths.iter().zip(&mut kept) {
+        let last = path.places.len() - 1;
+        (keep[0], keep[last]) = (true, true);
+        let fixed: Vec<usize> = (0..=last).filter(|k| keep[*k]).collect();
+        let mut stretches: Vec<[usize; 2]> = fixed.windows(2).map(|w| [w[0], w[1]]).collect();
+        while let Some([from, to]) = stretches.pop() {
+            if let Some(off) = farthest_off(path, from, to, tolerance) {
+                keep[off] = true;
+                stretches.extend([[from, off], [off, to]]);
+            }
+        }
+    }
+    kept
+}
+
+/// The place between two others that is farthest off the straight cone between them, if that is too
+/// far.
+fn farthest_off(path: &Path, from: usize, to: usize, tolerance: f64) -> Option<usize> {
+    let (a, b) = (&path.places[from], &path.places[to]);
+    let way = b.at - a.at;
+    let mut worst = None;
+    let mut most = 1.0;
+    for (k, place) in path.places.iter().enumerate().take(to).skip(from + 1) {
+        let t = ((place.at - a.at).dot(&way) / way.norm_squared().max(1e-18)).clamp(0.0, 1.0);
+        let off = (a.at + t * way - place.at).norm() / tolerance;
+        let radius = a.radius + (b.radius - a.radius) * t;
+        let off_radius =
+            (radius - place.radius).abs() / (RADIUS_SHARE * place.radius).max(0.25 * tolerance);
+        if off.max(off_radius) > most {
+            most = off.max(off_radius);
+            worst = Some(k);
+        }
+    }
+    worst
+}

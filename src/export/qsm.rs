@@ -1,0 +1,376 @@
+//! The wood for the tools of quantitative structure models (QSM): a table of cylinders, and a
+//! treefile.
+//!
+//! The table has the columns of SimpleForest (Hackenberg et al. 2015) and of aRchi, both of which
+//! rTwig reads, and behind them what is known of the sway. The treefile is that of RayCloudTools
+//! (Devereux et al. 2026). z is up in both.
+
+use crate::document::{TableWriter, unit};
+use crate::files::WriteError;
+use crate::geometry::Cylinder;
+use crate::model::{NodeId, Skeleton, SwayColumns, Swaying};
+use crate::shape::Limb;
+use nalgebra::Point3;
+use std::fmt::Write as _;
+use std::io::Write;
+
+/// The columns of SimpleForest, then those of aRchi, then the sway.
+const HEADER: &str = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius,length,growthLength,averagePointDistance,\
+segmentID,parentSegmentID,branchOrder,reverseBranchOrder,branchID,cyl_ID,parent_ID,extension_ID,radius_cyl,\
+volume,axis_ID,\
+segment_ID,node_ID,branching_order";
+/// Decimals of a number in a treefile.
+const DECIMALS: usize = 6;
+
+/// A tree as cylinders.
+#[derive(Clone, Debug)]
+pub struct Qsm {
+    pieces: Vec<Piece>,
+    /// Unit of lengths, in pixels, and how many decimals more they take.
+    decimals: usize,
+}
+
+/// A cylinder with what the tables say of it.
+#[derive(Clone, Debug)]
+struct Piece {
+    parent: Option<usize>,
+    /// z up.
+    start: Point3<f64>,
+    end: Point3<f64>,
+    radius: f64,
+    length: f64,
+    /// Its length and that of all it carries.
+    growth_length: f64,
+    /// Cylinders between two forks are one segment.
+    segment: usize,
+    parent_segment: Option<usize>,
+    branch: usize,
+    order: u32,
+    /// Forks to the farthest tip, and one.
+    reverse_order: u32,
+    /// The one in which it goes on.
+    extension: Option<usize>,
+    sway: SwayColumns,
+}
+
+/// The branches of one order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OrderSum {
+    pub branches: usize,
+    /// In the unit of the tables, m where the scale is known.
+    pub length: f64,
+    pub volume: f64,
+}
+
+impl Qsm {
+    /// Of cylinders, which are pieces of `limbs` of `skeleton`; `sway` is by node index.
+    /// `metres_per_px` 0 leaves pixels. `foot` is where the foot of the tree lies in the axes of
+    /// the table.
+    pub fn new(
+        cylinders: &[Cylinder],
+        limbs: &[Limb],
+        skeleton: &Skeleton,
+        sway: &[Swaying],
+        metres_per_px: f64,
+        foot: Point3<f64>,
+    ) -> Self {
+        let (scale, more) = unit(metres_per_px);
+        let place = |at: &Point3<f64>| foot + nalgebra::Vector3::new(at.x, -at.z, at.y) * scale;
+        let mut pieces: Vec<Piece> = Vec::with_capacity(cylinders.len());
+        let mut is_base: Vec<bool> = Vec::with_capacity(cylinders.len());
+        for own in cylinders {
+            let node = limbs[own.limb].node;
+            is_base.push(match own.parent {
+                Some(p) => {
+                    cylinders[p].branch != own.branch
+                        || (cylinders[p].limb == own.limb && is_base[p])
+                }
+                None => false,
+            });
+            // The first limb of a branch begins inside of what carries it, and is no thicker there
+            // than where it comes out.
+            let last = limbs[own.limb]
+                .samples
+                .last()
+                .map_or(own.radius, |s| s.radius);
+            let radius = if is_base.last() == Some(&true) {
+                own.radius.min(last)
+            } else {
+                own.radius
+            };
+            pieces.push(Piece {
+                parent: own.parent,
+                start: place(&own.start),
+                end: place(&own.end),
+                radius: radius * scale,
+                length: (own.end - own.start).norm() * scale,
+                growth_length: 0.0,
+                segment: 0,
+                parent_segment: None,
+                branch: own.branch,
+                order: own.order,
+                reverse_order: 1,
+                extension: None,
+                sway: sway_of(skeleton, sway, node),
+            });
+        }
+        let mut qsm = Self {
+            pieces,
+            decimals: 4 + more,
+        };
+        qsm.complete();
+        qsm
+    }
+
+    /// Finds what follows from parents and branches.
+    fn complete(&mut self) {
+        let pieces = &mut self.pieces;
+        let mut children = vec![0_usize; pieces.len()];
+        for i in (0..pieces.len()).rev() {
+            pieces[i].growth_length += pieces[i].length;
+            let Some(p) = pieces[i].parent else {
+                continue;
+            };
+            children[p] += 1;
+            let (own, growth) = (pieces[i].branch, pieces[i].growth_length);
+            pieces[p].growth_length += growth;
+            if pieces[p].branch == own {
+                pieces[p].extension = Some(i);
+            }
+        }
+        for i in (0..pieces.len()).rev() {
+            let own = pieces[i].reverse_order;
+            if let Some(p) = pieces[i].parent {
+                let up = own + u32::from(children[p] > 1);
+                pieces[p].reverse_order = pieces[p].reverse_order.max(up);
+            }
+        }
+        let mut segments = 0;
+        for i in 0..pieces.len() {
+            let parent = pieces[i].parent;
+            let goes_on =
+                parent.filter(|p| children[*p] == 1 && pieces[*p].branch == pieces[i].branch);
+            if let Some(p) = goes_on {
+                (pieces[i].segment, pieces[i].parent_segment) =
+                    (pieces[p].segment, pieces[p].parent_segment);
+            } else {
+                pieces[i].segment = segments;
+                pieces[i].parent_segment = parent.map(|p| pieces[p].segment);
+                segments += 1;
+            }
+        }
+    }
+
+    /// Number of cylinders.
+    pub fn len(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// Whether there is no wood.
+    pub fn is_empty(&self) -> bool {
+        self.pieces.is_empty()
+    }
+
+    /// Writes the table of cylinders. Numbers count from 0 as those of SimpleForest do, and the
+    /// parent of what stands on the ground is -1; those of aRchi count from 1, and it is 0. What is
+    /// not known of the sway is empty.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn table<W: Write>(&self, out: W) -> Result<W, WriteError> {
+        let header = format!("{HEADER},{}", SwayColumns::NAMES.join(","));
+        let mut table = TableWriter::new("qsm.csv", &header, out)?;
+        let or_minus_one = |of: Option<usize>| of.map_or(-1.0, |n| n as f64);
+        for (id, own) in self.pieces.iter().enumerate() {
+            table.count(id as u64);
+            table.number(or_minus_one(own.parent), 0);
+            for x in own.start.iter().chain(own.end.iter()) {
+                table.number(*x, self.decimals);
+            }
+            for length in [own.radius, own.length, own.growth_length] {
+                table.number(length, self.decimals);
+            }
+            table.text("");
+            table.count(own.segment as u64);
+            table.number(or_minus_one(own.parent_segment), 0);
+            table.count(own.order);
+            table.count(own.reverse_order);
+            table.count(own.branch as u64);
+            table.count(id as u64 + 1);
+            table.count(own.parent.map_or(0, |p| p as u64 + 1));
+            table.count(own.extension.map_or(0, |e| e as u64 + 1));
+            table.number(own.radius, self.decimals);
+            table.number(own.volume(), 3 * self.decimals);
+            for number in [own.branch, own.segment, own.segment] {
+                table.count(number as u64 + 1);
+            }
+            table.count(own.order + 1);
+            for x in own.sway.values() {
+                table.number(x, 5);
+            }
+            table.end_row()?;
+        }
+        table.finish()
+    }
+
+    /// The treefile: one line for the tree. Its first segment is the foot, each other one ends a
+    /// cylinder. Frequencies and damping ratios that are not known are `nan`.
+    pub fn treefile(&self) -> String {
+        let names = SwayColumns::NAMES.join(",");
+        let mut text = format!(
+            "# tree file: segments end at x,y,z; parents count from 0; z is up\nx,y,z,radius,parent_id,{names}\n"
+        );
+        let Some(first) = self.pieces.first() else {
+            return text;
+        };
+        push_segment(
+            &mut text,
+            &first.start,
+            first.radius,
+            -1,
+            &SwayColumns::of(None),
+        );
+        for own in &self.pieces {
+            let parent = own.parent.map_or(0, |p| p as i64 + 1);
+            text.push_str(", ");
+            push_segment(&mut text, &own.end, own.radius, parent, &own.sway);
+        }
+        text.push('\n');
+        text
+    }
+
+    /// Sums by order, the trunk's first.
+    pub fn by_order(&self) -> Vec<OrderSum> {
+        let mut sums: Vec<OrderSum> = Vec::new();
+        for own in &self.pieces {
+            let order = own.order as usize;
+            if sums.len() <= order {
+                sums.resize(order + 1, OrderSum::default());
+            }
+            let begins = own
+                .parent
+                .is_none_or(|p| self.pieces[p].branch != own.branch);
+            sums[order].branches += usize::from(begins);
+            sums[order].length += own.length;
+            sums[order].volume += own.volume();
+        }
+        sums
+    }
+}
+
+impl Piece {
+    fn volume(&self) -> f64 {
+        std::f64::consts::PI * self.radius * self.radius * self.length
+    }
+}
+
+/// The sway of the branch that a node is a part of.
+fn sway_of(skeleton: &Skeleton, sway: &[Swaying], node: NodeId) -> SwayColumns {
+    let mover = skeleton.mover(node);
+    SwayColumns::of(sway.get(mover.index()).and_then(|s| s.as_ref().ok()))
+}
+
+fn push_segment(text: &mut String, at: &Point3<f64>, radius: f64, parent: i64, sway: &SwayColumns) {
+    // Writing to a string does not fail.
+    let _ = write!(
+        text,
+        "{:.DECIMALS$},{:.DECIMALS$},{:.DECIMALS$},{radius:.DECIMALS$},{parent}",
+        at.x, at.y, at.z
+    );
+    for x in sway.values() {
+        let _ = match x.is_finite() {
+            true => write!(text, ",{x:.5}"),
+            false => write!(text, ",nan"),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::cylinders_by_branch;
+    use crate::model::{Excitation, Interval, Sway, Unidentified};
+
+    /// The forked skeleton, drawn without curls and twigs; its left limb sways.
+    fn qsm() -> Qsm {
+        let skeleton = Skeleton::forked();
+        let plain = crate::config::Wood {
+            curl: 0.0,
+            max_twigs: 0,
+            ..Default::default()
+        };
+        let limbs = crate::shape::limbs(&skeleton, &|_, _| false, &plain, 0);
+        let rows = cylinders_by_branch(&limbs, &skeleton);
+        let mut sway = vec![Err(Unidentified::NotMeasured); 4];
+        let frequency_hz = Interval {
+            value: 2.0,
+            lo: 1.9,
+            hi: 2.1,
+        };
+        sway[2] = Ok(Sway {
+            frequency_hz,
+            damping_ratio: None,
+            excitation: Excitation::Release,
+            amplitude_deg: 3.0,
+        });
+        Qsm::new(
+            &rows,
+            &limbs,
+            &skeleton,
+            &sway,
+            0.01,
+            Point3::new(5.0, 6.0, 7.0),
+        )
+    }
+
+    #[test]
+    fn the_table_has_what_both_tools_ask_for() {
+        let text = String::from_utf8(qsm().table(Vec::new()).expect("written")).expect("text");
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let header = reader.headers().expect("header").clone();
+        let column = |name: &str| {
+            header
+                .iter()
+                .position(|h| h == name)
+                .unwrap_or_else(|| panic!("{name}"))
+        };
+        let rows: Vec<csv::StringRecord> = reader.records().map(|r| r.expect("row")).collect();
+        let cell = |row: usize, name: &str| rows[row][column(name)].to_owned();
+        assert_eq!(
+            [cell(0, "parentID"), cell(0, "parent_ID"), cell(0, "cyl_ID")],
+            ["-1", "0", "1"]
+        );
+        assert_eq!(
+            [cell(0, "startX"), cell(0, "startY"), cell(0, "startZ")],
+            ["5", "6", "7"]
+        );
+        assert_eq!(cell(0, "segmentID"), "0");
+        assert_eq!(cell(0, "reverseBranchOrder"), "2");
+        let swaying = rows
+            .iter()
+            .filter(|row| row[column("frequency_hz")] == *"2")
+            .count();
+        assert!(swaying > 0 && swaying < rows.len() / 2, "{swaying}");
+        let growth: f64 = cell(0, "growthLength").parse().expect("number");
+        let lengths = rows
+            .iter()
+            .map(|row| row[column("length")].parse::<f64>().expect("number"));
+        assert!((growth - lengths.sum::<f64>()).abs() < 0.01);
+    }
+
+    #[test]
+    fn the_treefile_and_the_table_are_read_as_the_same_tree() {
+        let qsm = qsm();
+        let treefile = qsm.treefile();
+        assert!(
+            treefile.contains(",2.00000,1.90000,2.10000,nan"),
+            "{treefile}"
+        );
+        let sums = qsm.by_order();
+        assert_eq!(sums.iter().map(|s| s.branches).collect::<Vec<_>>(), [1, 1]);
+        assert!(
+            sums[0].volume > sums[1].volume && sums[0].length > 1.8,
+            "{sums:?}"
+        );
+    }
+}

@@ -1,0 +1,112 @@
+//! Documents of trees in point clouds.
+
+use super::PrepareError;
+use super::drawn::{DrawnTree, note};
+use crate::cloud::{CloudTree, Registration};
+use crate::config::{Config, LeafShow};
+use crate::document::note::{ScanFilmNote, ScanNote};
+use crate::model::{Outline, PointCloud, Swaying};
+use crate::pipeline::ScaledTree;
+use nalgebra::Vector3;
+use std::path::{Path, PathBuf};
+
+/// A film that was laid on a scan.
+#[derive(Clone, Debug)]
+pub struct FilmOnScan {
+    pub registration: Registration,
+    /// By node index of the scanned tree.
+    pub sway: Vec<Swaying>,
+}
+
+impl FilmOnScan {
+    /// Pieces of branches that carry a filmed frequency.
+    pub fn branches(&self) -> usize {
+        self.sway.iter().filter(|s| s.is_ok()).count()
+    }
+
+    fn note(&self) -> ScanFilmNote {
+        let registration = &self.registration;
+        ScanFilmNote {
+            turn_deg: registration.turn.to_degrees(),
+            roll_deg: registration
+                .to_picture
+                .isometry
+                .rotation
+                .angle()
+                .to_degrees(),
+            px_per_metre: registration.to_picture.scaling(),
+            miss: registration.miss,
+            other_side_miss: registration.other_side_miss,
+            branches: self.branches() as u64,
+        }
+    }
+}
+
+/// The settings that trees of point clouds have if no others are given: nothing is added to what
+/// was scanned.
+pub fn scan_defaults() -> Config {
+    let mut config = Config::default();
+    config.shape.planes = 1;
+    config.wood.curl = 0.0;
+    config.wood.max_twigs = 0;
+    config.leaves.show = LeafShow::Off;
+    config
+}
+
+impl DrawnTree {
+    /// The tree of a cloud, which is `scaled` in space, within `region` in its picture. `name` says
+    /// where the cloud is from.
+    pub fn scanned(
+        name: String,
+        cloud: &PointCloud,
+        tree: &CloudTree,
+        scaled: ScaledTree,
+        region: &Outline,
+        mut config: Config,
+    ) -> Self {
+        config.export.metres_per_px = scaled.metres_per_px;
+        let mut note = note(name, &scaled.skeleton, region, config);
+        note.scan = Some(scan_note(cloud, tree));
+        Self {
+            note,
+            skeleton: scaled.skeleton,
+        }
+    }
+}
+
+impl DrawnTree {
+    /// Writes a scanned tree as a document to `dir`, which appears when it is complete, with the
+    /// sway of a film on it.
+    ///
+    /// # Errors
+    /// `dir` is there already, or a file cannot be written.
+    pub fn write_with_film(
+        mut self,
+        dir: &Path,
+        film: &FilmOnScan,
+    ) -> Result<PathBuf, PrepareError> {
+        if let Some(scan) = &mut self.note.scan {
+            scan.film = Some(film.note());
+        }
+        self.write_swaying(dir, &film.sway)
+    }
+}
+
+fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
+    let figures = tree.figures;
+    let foot = tree
+        .nodes
+        .first()
+        .map_or(Vector3::zeros(), |n| n.position.coords);
+    ScanNote {
+        foot_m: (foot + cloud.origin).into(),
+        points: figures.points as u64,
+        ground_points: figures.ground as u64,
+        noise_points: figures.noise as u64,
+        apart_points: figures.apart as u64,
+        cell_m: figures.cell_m,
+        noise_m: figures.noise_m,
+        twig_radius_m: figures.twig_radius_m,
+        film: None,
+    }
+}
