@@ -339,6 +339,29 @@ fn an_example_that_says_nothing_is_refused() {
     }
 }
 
+/// A new tree has no film whose length its note could say.
+#[test]
+fn a_new_tree_is_drawn_at_any_moment_of_its_loop() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("trees");
+    grown(&out, &["--count", "1"]);
+    for (k, at_s) in ["0", "3", "9.9", "11"].into_iter().enumerate() {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command
+            .arg("render")
+            .arg(out.join("tree-0001"))
+            .args(["--at", at_s, "--bare"]);
+        let picture = dir.path().join(format!("{k}.png"));
+        let output = command
+            .arg("--out")
+            .arg(&picture)
+            .output()
+            .expect("arborcam");
+        assert_eq!(output.status.success(), at_s != "11", "{at_s} s");
+        assert_eq!(picture.exists(), at_s != "11", "{at_s} s");
+    }
+}
+
 /// New trees fill the example's envelope as well as it does and have angles as likely as its: medians
 /// of twenty, with some room for chance.
 #[test]

@@ -20,6 +20,8 @@ pub enum TopiaryError {
     NoShape,
     #[error("is empty: every pixel is transparent; draw the shape opaque")]
     Empty,
+    #[error("is a shape of {width}x{height} pixels only; draw it larger")]
+    TooSmall { width: u32, height: u32 },
     #[error(
         "lies off the tree: the trunk does not reach it; draw it over the tree, or in another size than the picture's"
     )]
@@ -29,6 +31,9 @@ pub enum TopiaryError {
     #[error("is not whole: {found} bytes where a {size} picture has four a pixel")]
     NotWhole { found: usize, size: Size },
 }
+
+/// Width and height of a shape at least, px: a speck is none.
+const LEAST_PX: u32 = 4;
 
 /// A shape as it was drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,6 +91,11 @@ impl Drawn {
     fn of_inside(size: Size, inside: Vec<bool>) -> Result<Self, TopiaryError> {
         let mask: Vec<u8> = inside.iter().map(|i| u8::from(*i) * 255).collect();
         let bounds = bounds_px(&mask, size).ok_or(TopiaryError::Empty)?;
+        let [left, top, right, bottom] = bounds;
+        let (width, height) = (right - left + 1, bottom - top + 1);
+        if width.min(height) < LEAST_PX {
+            return Err(TopiaryError::TooSmall { width, height });
+        }
         Ok(Self {
             size,
             inside,
