@@ -186,7 +186,7 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
             vec!["animate", shown, "--wind", "4", "--seconds", "2"],
             "wind.glb",
         ),
-        (vec!["export", shown, "--format", "html"], "tree.html"),
+        (vec!["export", shown, "--format", "ply"], "tree.ply"),
         (
             vec!["grow", shown, "--count", "2", "--motion", "none"],
             "grown",
