@@ -146,7 +146,8 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         return Err(CommandError::Stopped);
     }
     let branches = document.skeleton.measured_branches().count();
-    match args.film_on(&tree, &cloud, &document)? {
+    let unit_m = args.unit.map(Unit::metres).or(unit_in_file_m);
+    match args.film_on(&tree, &cloud, unit_m.unwrap_or(1.0), &document)? {
         Some(film) => {
             let (swaying, miss) = (film.branches(), 100.0 * film.registration.miss);
             document.write_with_film(&args.out, &film)?;
@@ -162,7 +163,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
 }
 
 impl CloudArgs {
-    /// The film on the scan, if there is one.
+    /// The film on the scan, if there is one. `unit_m` is the unit of the scan, m.
     ///
     /// # Errors
     /// It cannot be read, or does not lie on the scan.
@@ -170,6 +171,7 @@ impl CloudArgs {
         &self,
         tree: &CloudTree,
         cloud: &PointCloud,
+        unit_m: f64,
         document: &DrawnTree,
     ) -> Result<Option<FilmOnScan>, CommandError> {
         let Some(dir) = &self.film else {
@@ -181,7 +183,6 @@ impl CloudArgs {
             .first()
             .map_or(Vector3::zeros(), |n| n.position.coords)
             + cloud.origin;
-        let unit_m = self.unit.map_or(1.0, Unit::metres);
         let pairs = self.pairs.as_ref().map(|pairs| {
             let against_foot = |p: &PlacePair| PlacePair {
                 scan: p.scan * unit_m - foot,
