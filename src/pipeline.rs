@@ -19,6 +19,8 @@ mod film_log;
 mod front;
 mod grown;
 mod leaves;
+#[cfg(feature = "opencv")]
+mod marked;
 mod pose_tracker;
 mod refiner;
 mod reshape;
@@ -26,6 +28,8 @@ mod reshape;
 mod seeds;
 mod seen;
 mod sway;
+#[cfg(feature = "opencv")]
+mod tagged;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 mod wood;
 
@@ -45,6 +49,8 @@ pub use reshape::{MOST_RESHAPED, cut_to, push_terms, reshape};
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;
 pub use sway::{SwayJob, SwayStage};
+#[cfg(feature = "opencv")]
+pub use tagged::TagNews;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 pub use wood::find_wood;
 
@@ -73,7 +79,7 @@ impl Pipeline {
     /// There is no decoder.
     pub fn new(config: &Config, outline: Option<Outline>) -> Result<Self, DecodeError> {
         Ok(Self {
-            decode: DecodeStage::new(false, None)?,
+            decode: DecodeStage::of_film(config)?,
             front: FrontEnd::new(config, outline),
             back: BackEnd::new(config),
             sway: SwayStage::new(&config.dynamics),

@@ -21,6 +21,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
+    ("markers", &["model", "config"]),
+    ("tag", &["model", "signal"]),
     // Pictures are carried to the rest pose.
     (
         "wood",
@@ -74,6 +76,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "dynamics",
             "outline",
             "track",
+            "markers",
+            "tag",
             "hierarchy",
             "skeleton",
             "shape",
@@ -104,6 +108,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            "signal",
             "files",
             "motion::PoseEstimator",
             "outline",
@@ -166,6 +171,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "caught",
             "source",
             "outline",
+            "markers",
             "dynamics",
             "signal",
             "pipeline",
@@ -238,7 +244,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("kurbo::", &["import"]),
     ("flate2::", &["export"]),
     ("base64::", &["export"]),
-    ("opencv::", &["track", "outline", "wood"]),
+    ("opencv::", &["track", "outline", "wood", "markers"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),

@@ -15,6 +15,7 @@ mod forest;
 mod grow;
 mod hangup;
 mod line;
+mod markers;
 mod note;
 mod notes;
 mod output;
