@@ -15,6 +15,8 @@ Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
                  radius at each point of the rest shape (px), whether it is seen there; of a film in wind also the mean shape
   wood.png       how much of each pixel shows this tree's wood at rest, 0 to 255; leaves.png: the same of its leaves
   wood_mean.png, leaves_mean.png   of a film in wind, in which the tree is never at rest: the same in its mean pose
+  truth_markers.json, markers.json   with --markers: coloured discs on the branches, a board hides one of them for a second; where
+                 each is in every frame; the windows and parents that a user would give
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
@@ -35,7 +37,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from made_films import bad_input, motion, picture, scenery, surface, tree, truth
+from made_films import bad_input, markers, motion, picture, scenery, surface, tree, truth
 
 DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
@@ -51,12 +53,13 @@ def main():
     parser.add_argument("mode", choices=["release", "held", "wind"])
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
+    parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
     args = parser.parse_args()
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
-    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad)
+    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
@@ -68,6 +71,11 @@ def make(folder, seed, leafy, mode, frames, bad_kinds):
     bad.set_up(seed, background, skin, camera, frames)
 
     hidden = bad.hides()
+    put_on = markers.put_on(n_markers, branches, pose, camera, skin, frames, hidden)
+    skin = surface.join([skin, *(m.skin for m in put_on)])
+    if put_on:
+        board = markers.board_before(put_on[-1], frames)
+        bad.boards = [] if board is None else [board]
     seen = truth.facet_map(skin, pose, camera, hidden)
     pix0, branch, pos_2d = truth.grid(rng, skin, pose, camera, seen, frames)
     drive.update(pull_direction=truth.rounded(pull_direction), leaf_flutter_rad=surface.FLUTTER_RAD if leafy else 0.0)
@@ -94,6 +102,9 @@ def make(folder, seed, leafy, mode, frames, bad_kinds):
     np.savez_compressed(folder / "grid.npz", pix0=pix0, branch=branch, pos_2d=pos_2d)
     (folder / "outline.json").write_text(json.dumps(truth.outline(seen)))
     (folder / "truth.json").write_text(json.dumps(film))
+    if put_on:
+        (folder / "truth_markers.json").write_text(json.dumps(markers.as_truth(put_on, board, put_on[-1])))
+        (folder / "markers.json").write_text(json.dumps(markers.as_file(put_on)))
 
 
 if __name__ == "__main__":

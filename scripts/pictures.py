@@ -12,6 +12,10 @@
                                                a photograph with its strokes (crown red, branch blue), the masks (leaves green,
                                                wood brown), and the branches that were seen and those that were grown; of one
                                                tree or, with commas between the names, of several
+    pictures.py markers FILM_DIR CAPTURE FIRST.png LATER.png LATER_FRAME OUT.png
+                                               the first frame with the windows of its markers, a later one with where they
+                                               are followed; below, of the first two markers, the way of the second one, the
+                                               angle of its branch to that of the first, and its spectrum (needs numpy)
     pictures.py triangles EXAMPLE TREES OUT.png
                                                the forks of an example and of the trees grown of it in the triangles of their
                                                angles and lengths, with the fitted Dirichlet densities (needs numpy, scipy)
@@ -312,6 +316,71 @@ def cloud(ply, document, side, out):
     Image.fromarray(grey.astype(np.uint8)).convert("RGB").save(out)
 
 
+MARKER_BLUE, MARKER_YELLOW, AXES = (40, 90, 230), (255, 220, 0), (120, 120, 120)
+FIRST_MARKER = 1_000_000_000
+
+
+def markers(film, capture, first, later, later_frame, out):
+    """Hu et al. figs 2, 3, 6 and 7 for a made film."""
+    import numpy as np
+
+    windows = json.loads((Path(capture) / "capture.json").read_text())["config"]["markers"]["windows"]
+    seen = {}
+    for row in rows(Path(capture) / "tracks.csv"):
+        if int(row["track_id"]) >= FIRST_MARKER:
+            place = float(row["u_px"]), float(row["v_px"]), float(row["time_s"])
+            seen.setdefault(int(row["track_id"]) - FIRST_MARKER, {})[int(row["frame"])] = place
+    pictures = [Image.open(path).convert("RGB") for path in (first, later)]
+    font = ImageFont.truetype(str(FONTS / "DejaVuSans.ttf"), 11)
+    draw = ImageDraw.Draw(pictures[0])
+    for window in windows:
+        u, v, width, height = window["window_px"]
+        draw.rectangle((u, v, u + width, v + height), outline=MARKER_BLUE)
+        draw.text((u + width + 2, v), window["name"], fill=MARKER_BLUE, font=font)
+    draw = ImageDraw.Draw(pictures[1])
+    for k, window in enumerate(windows):
+        if int(later_frame) in seen.get(k, {}):
+            u, v, _ = seen[k][int(later_frame)]
+            draw.ellipse((u - 7, v - 7, u + 7, v + 7), outline=MARKER_YELLOW)
+            draw.text((u + 9, v - 12), window["name"], fill=(0, 0, 0), font=font)
+    frames = sorted(set(seen[0]) & set(seen[1]))
+    lower, upper = (np.array([seen[k][f][:2] for f in frames]) for k in (0, 1))
+    time_s = np.array([seen[0][f][2] for f in frames])
+    outline = json.loads((Path(film) / "outline.json").read_text())["polygon_px"]
+    foot = np.array(max(outline, key=lambda p: p[1]), float)
+    turn = lambda a: np.unwrap(np.arctan2(a[:, 0], -a[:, 1]))
+    angle_deg = np.degrees(turn(upper - lower) - turn(lower - foot))
+    angle_deg -= angle_deg.mean()
+    even_s = np.linspace(time_s[0], time_s[-1], len(time_s))
+    power = np.abs(np.fft.rfft(np.interp(even_s, time_s, angle_deg), 8 * len(time_s))) * 2 / len(time_s)
+    hz = np.fft.rfftfreq(8 * len(time_s), even_s[1] - even_s[0])
+    width, height = pictures[0].size
+    picture = Image.new("RGB", (2 * width, height + 230), "white")
+    for k, part in enumerate(pictures):
+        picture.paste(part, (k * width, 0))
+    draw, part = ImageDraw.Draw(picture), 2 * width // 3
+    name = windows[1]["name"]
+    shown = hz <= 5
+    curve(draw, (0, height, part, 230), upper[:, 0], -upper[:, 1], f"way of {name}, px", font)
+    curve(draw, (part, height, part, 230), time_s, angle_deg, f"angle of {windows[0]['name']}-{name} to its parent, degrees, by s", font)
+    curve(draw, (2 * part, height, part, 230), hz[shown], power[shown], "its spectrum, degrees, by Hz", font)
+    save(picture, out)
+
+
+def curve(draw, box, x, y, title, font):
+    """One line in a box (left, top, width, height) with its extremes."""
+    left, top, width, height = box
+    inner = left + 46, top + 24, left + width - 14, top + height - 26
+    (x0, x1), (y0, y1) = (x.min(), x.max()), (y.min(), y.max())
+    to = lambda a, b: (inner[0] + (a - x0) / (x1 - x0) * (inner[2] - inner[0]), inner[3] - (b - y0) / (y1 - y0) * (inner[3] - inner[1]))
+    draw.rectangle(inner, outline=AXES)
+    draw.line([to(a, b) for a, b in zip(x, y)], fill=MARKER_BLUE, width=1)
+    draw.text((inner[0], top + 6), title, fill=(0, 0, 0), font=font)
+    for value, at, anchor in ((y0, (inner[0] - 4, inner[3]), "rs"), (y1, (inner[0] - 4, inner[1]), "rt"),
+                              (x0, (inner[0], inner[3] + 4), "lt"), (x1, (inner[2], inner[3] + 4), "rt")):
+        draw.text(at, f"{abs(value) if anchor[0] == 'r' and title.startswith('way') else value:.1f}", fill=AXES, font=font, anchor=anchor)
+
+
 def draw_strokes(draw, element, scale, width):
     width = float(element.get("stroke-width", width))
     line = stroke_of(element)
@@ -416,7 +485,7 @@ def dirichlet(shares):
 if __name__ == "__main__":
     commands = {
         "terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5), "drawing": (drawing, 3),
-        "photo": (photo, 5), "cloud": (cloud, 4), "triangles": (triangles, 3),
+        "photo": (photo, 5), "cloud": (cloud, 4), "markers": (markers, 6), "triangles": (triangles, 3),
     }
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
     if command is None or len(sys.argv) != 2 + count:

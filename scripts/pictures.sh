@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, sketch, photo, cloud, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# wind, grown, sketch, photo, cloud, markers, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
 # clip) go to out/;
-# without CLIPS the second is of a film made anew, for which, and for `grown` and `photo`, PYTHON (python3) needs numpy, scipy and opencv.
+# without CLIPS the second is of a film made anew, for which, and for `grown`, `photo` and `markers`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -294,6 +294,18 @@ cloud() {
     row "$to/cloud.png" "$work"/{cloud-points,scanned-front,scanned-side}.png
 }
 
+# A made film with coloured markers, one of which a board hides for a second.
+markers() {
+    local film=$work/marked
+    "$python" benches/made_films.py "$work" marked 46003 bare held --markers 10 --seconds 13.634 ||
+        fail "no film with markers could be made; see the head of benches/made_films.py for what PYTHON needs"
+    "$arborcam" replay "$film/video.mkv" --outline "$film/outline.json" --markers "$film/markers.json" --fast --headless \
+        --out "$work/marked-tree" 2>"$work/marked.log" || fail "the replay with markers failed: $(tail -n 1 "$work/marked.log")"
+    ffmpeg -v error -nostdin -y -i "$film/video.mkv" -vf "select='eq(n,0)+eq(n,132)'" -vsync 0 "$work/marked-%d.png"
+    "$python" scripts/pictures.py markers "$film" "$work/marked-tree" "$work"/marked-{1,2}.png 132 "$to/markers.png"
+    told "$to/markers.png"
+}
+
 # Forty trees of eight on a hill.
 forest() {
     local tree=winter
@@ -417,6 +429,7 @@ wanted grown && grown
 wanted sketch && sketch
 wanted photo && photo
 wanted cloud && cloud
+wanted markers && markers
 wanted forest && forest
 wanted points && points
 wanted terminal && terminal

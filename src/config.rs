@@ -6,19 +6,21 @@
 
 mod declare;
 mod load;
+mod markers;
 mod reference;
 mod reload;
 mod setting;
 mod settings;
 
 pub use load::{ConfigError, STROKE_POINTS, check_strokes};
+pub use markers::{MAX_MARKERS, MarkerCorrection, MarkerWindow};
 pub use reference::{default_file, help, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};
 pub use settings::{
     Accumulate, Affinity, Backend, Camera, CameraFormat, Config, Detect, Dynamics, EnvelopeKind,
-    Excited, Export, Hierarchy, Leader, LeafShow, Leaves, Motion, MotionMethod, Outline, SECTIONS,
-    Shape, Skeleton, TraceBy, Track, Wind, Wood,
+    Excited, Export, Hierarchy, Leader, LeafShow, Leaves, MarkerMethod, Markers, Motion,
+    MotionMethod, Outline, SECTIONS, Shape, Skeleton, Tag, TraceBy, Track, Wind, Wood,
 };
 
 use std::time::Duration;
@@ -27,5 +29,12 @@ impl Camera {
     /// [`timeout_s`](Self::timeout_s) as a duration.
     pub fn time_limit(&self) -> Duration {
         Duration::from_secs_f64(self.timeout_s.clamp(0.001, 1e6))
+    }
+}
+
+impl Markers {
+    /// Whether any markers are to be followed.
+    pub fn are_wanted(&self) -> bool {
+        self.find || !self.windows.is_empty()
     }
 }

@@ -24,7 +24,7 @@
 //! # The modules in reading order
 //!
 //! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree
-//! · `track` points followed · [`hierarchy`] which points move together · `wood` which pixels are
+//! · `track` points followed · `markers` coloured markers followed · [`tag`] a printed tag that gives the scale · [`hierarchy`] which points move together · `wood` which pixels are
 //! wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
 //! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
 //! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches,
@@ -44,7 +44,7 @@
 //!
 //! | feature | adds | modules |
 //! |---|---|---|
-//! | `opencv` | pictures to tracks | `outline`, `track`, `wood`, front end of [`pipeline`] |
+//! | `opencv` | pictures to tracks | `outline`, `track`, `markers`, `wood`, front end of [`pipeline`] |
 //! | `camera` | cameras, recordings, videos | `source`, `recording`, decoding in [`pipeline`] |
 //! | `nokhwa` | a second way to read cameras | inside of `source` |
 //! | `terminal` | the program; needs `opencv` and `camera` | `runtime`, `tui`, `doctor`, `cli` |
@@ -69,6 +69,8 @@ pub mod geometry;
 pub mod grow;
 pub mod hierarchy;
 pub mod import;
+#[cfg(feature = "opencv")]
+pub mod markers;
 pub mod model;
 pub mod motion;
 #[cfg(feature = "opencv")]
@@ -86,6 +88,7 @@ pub mod skeleton;
 pub mod solve;
 #[cfg(feature = "camera")]
 pub mod source;
+pub mod tag;
 #[cfg(feature = "opencv")]
 pub mod track;
 #[cfg(feature = "terminal")]

@@ -20,6 +20,7 @@ mod front;
 mod grown;
 mod leaves;
 #[cfg(feature = "opencv")]
+mod marked;
 mod photograph;
 mod pose_tracker;
 mod refiner;
@@ -29,6 +30,8 @@ mod scanned;
 mod seeds;
 mod seen;
 mod sway;
+#[cfg(feature = "opencv")]
+mod tagged;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 mod wood;
 
@@ -51,6 +54,8 @@ pub use scanned::{ScaledTree, stand_scanned};
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;
 pub use sway::{SwayJob, SwayStage};
+#[cfg(feature = "opencv")]
+pub use tagged::TagNews;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 pub use wood::find_wood;
 
@@ -79,7 +84,7 @@ impl Pipeline {
     /// There is no decoder.
     pub fn new(config: &Config, outline: Option<Outline>) -> Result<Self, DecodeError> {
         Ok(Self {
-            decode: DecodeStage::new(false, None)?,
+            decode: DecodeStage::of_film(config)?,
             front: FrontEnd::new(config, outline),
             back: BackEnd::new(config),
             sway: SwayStage::new(&config.dynamics),

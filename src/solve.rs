@@ -87,10 +87,10 @@ fn without_doubtful(
     config: &Config,
 ) -> Model {
     let window = log.last(config.accumulate.window_s);
-    Model {
-        left_out: hierarchy::left_out(window, before, &config.accumulate),
-        ..model
-    }
+    let mut left_out = hierarchy::left_out(window, before, &config.accumulate);
+    // Coloured markers are on their places, whatever the points around them do.
+    left_out.retain(|id| id.marker().is_none());
+    Model { left_out, ..model }
 }
 
 /// The model with its modes: how its branches sway in `film`, whose points are on the nodes of the

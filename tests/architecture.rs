@@ -21,6 +21,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
     ),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
+    ("markers", &["model", "config"]),
+    ("tag", &["model", "signal"]),
     // Pictures are carried to the rest pose.
     (
         "wood",
@@ -75,6 +77,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "dynamics",
             "outline",
             "track",
+            "markers",
+            "tag",
             "hierarchy",
             "skeleton",
             "shape",
@@ -109,6 +113,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            "signal",
             "files",
             "motion::PoseEstimator",
             "outline",
@@ -173,6 +178,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "caught",
             "source",
             "outline",
+            "markers",
             "dynamics",
             "signal",
             "pipeline",
@@ -248,7 +254,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("e57::", &["import"]),
     ("flate2::", &["export"]),
     ("base64::", &["export"]),
-    ("opencv::", &["track", "outline", "wood"]),
+    ("opencv::", &["track", "outline", "wood", "markers"]),
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),

@@ -178,6 +178,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         config: Config::default(),
         outline: None,
         picture: None,
+        tag: None,
         leaves: None,
         bark: None,
         masks: None,

@@ -46,6 +46,7 @@ fn frame(k: u64, at: impl Fn(f64, f64) -> f64) -> Frame {
         received: Instant::now(),
         luma,
         preview: None,
+        colour: None,
         raw: None,
     }
 }

@@ -49,6 +49,7 @@ class BadInput:
     kinds: list
     leafy: bool
     behind: list = field(default_factory=list)  # OtherTree
+    boards: list = field(default_factory=list)  # markers.Board
     wires: list = field(default_factory=list)  # (N, 2) lines in pixels
     wire_px: float = 2.2
     shade: np.ndarray = None  # share of the light that is left, repeated sideways without a seam
@@ -102,6 +103,8 @@ class BadInput:
         """Draws what hangs in front on the fine canvas, and at a time who walks there."""
         if time_s is not None and self.walks is not None:
             self.walks.draw(canvas, time_s)
+        for board in self.boards if time_s is not None else []:
+            board.draw(canvas, time_s)
         for line in self.wires:
             fixed = np.round(((line + 0.5) * FINE - 0.5) * (1 << picture.SHIFT)).astype(np.int32)
             cv2.polylines(canvas, [fixed], False, (48, 45, 45), round(self.wire_px * FINE), cv2.LINE_8, picture.SHIFT)

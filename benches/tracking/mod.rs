@@ -111,6 +111,7 @@ fn costs(clip: &Path, wanted: u32) -> (Costs, Costs, f64) {
             received: Instant::now(),
             luma,
             preview: None,
+            colour: None,
             raw: None,
         })
     };

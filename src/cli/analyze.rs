@@ -9,11 +9,11 @@ use super::output::{eprint_line, print};
 use super::stop::Stop;
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, Excited};
-use crate::document::{Document, DocumentError};
+use crate::document::{Document, DocumentError, MarkedTree};
 use crate::dynamics::{Depth, Film, Take, analyse};
 use crate::export::picture::data_address;
 use crate::files::refuse_taken;
-use crate::model::{Excitation, FilmCut, Pose, Skeleton, Swaying, TreeMode};
+use crate::model::{Excitation, FilmCut, Lens, NodeName, Pose, Skeleton, Swaying, TreeMode};
 use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
 use crate::tui::columns;
 use crate::views::{SwayFound, update};
@@ -107,7 +107,10 @@ fn warning(args: &AnalyzeArgs, comparison: &Comparison) -> Option<&'static str> 
 fn read_documents(args: &AnalyzeArgs) -> Result<Vec<Document>, CommandError> {
     let mut documents = Vec::with_capacity(args.dirs.len());
     for dir in &args.dirs {
-        let document = Document::tree(dir)?;
+        let document = match args.by_markers() {
+            true => Document::for_markers(dir)?,
+            false => Document::tree(dir)?,
+        };
         args.scale.check_size(document.skeleton.image_size)?;
         documents.push(document);
     }
@@ -185,16 +188,24 @@ fn analyse_capture(
     for warning in &document.warnings {
         notes.add("warning", warning.clone());
     }
-    let take = Take::of(film(args, document, &config, &mut notes)?);
+    let marked = marked_tree(args, document, &config)?;
+    let camera = Optics::of(args, document)?;
+    let filmed = film(args, document, marked.as_ref(), &config, &mut notes)?;
+    let take = Take::of(camera.film(&filmed));
     if let Some(warning) = take.warning() {
         notes.add("warning", warning);
     }
     let film = &take.film;
-    // Copies have no measured points.
-    let skeleton = Skeleton {
-        nodes: document.skeleton.nodes[..document.skeleton.measured()].to_vec(),
-        ..(*document.skeleton).clone()
+    let skeleton = match &marked {
+        Some(marked) => marked.skeleton.clone(),
+        // Copies have no measured points.
+        None => Skeleton {
+            nodes: document.skeleton.nodes[..document.skeleton.measured()].to_vec(),
+            ..(*document.skeleton).clone()
+        },
     };
+    let filmed_skeleton = skeleton;
+    let skeleton = camera.skeleton(&filmed_skeleton);
     let progress = Progress::begin(name, skeleton.nodes.len().saturating_sub(1));
     let analysis = analyse(
         &skeleton,
@@ -208,7 +219,14 @@ fn analyse_capture(
     for hint in hints(film, &analysis, is_excitation_given) {
         notes.add("note", hint);
     }
-    let poses = poses_for_plots(document, film, skeleton.nodes.len(), &mut notes);
+    let poses = match &marked {
+        Some(marked) => marked.poses(film, &skeleton),
+        None => {
+            let mut poses = poses_for_plots(document, film, skeleton.nodes.len(), &mut notes);
+            camera.straighten(&mut poses, &filmed_skeleton);
+            poses
+        }
+    };
     let picture = document.picture.as_ref().filter(|_| args.report.is_some());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
     let outline = document.note.outline.iter();
@@ -220,7 +238,7 @@ fn analyse_capture(
     let note = &document.note;
     let renewed = note.judgement_with(&skeleton, &analysis.sway, cut);
     let renewed = renewed.filter(|_| args.update).map(|j| j.verdict);
-    let study = Study::of(&Given {
+    let mut study = Study::of(&Given {
         name,
         source: &document.note.source.name,
         origin: &document.note.origin(),
@@ -236,6 +254,9 @@ fn analyse_capture(
         picture: picture.as_deref(),
         notes: &notes.all,
     });
+    if let Some(marked) = &marked {
+        name_by_markers(&mut study, marked);
+    }
     Ok(CaptureAnalysis {
         found: Found {
             modes: analysis.modes,
@@ -244,6 +265,96 @@ fn analyse_capture(
         },
         study,
     })
+}
+
+/// What a camera does to the points that it films, and is undone here.
+struct Optics {
+    lens: Option<Lens>,
+    readout_s: f64,
+    height_px: f64,
+}
+
+impl Optics {
+    /// As the options say, for the pictures of a capture.
+    ///
+    /// # Errors
+    /// The lens is for pictures of other proportions.
+    fn of(args: &AnalyzeArgs, document: &Document) -> Result<Self, CommandError> {
+        let size = document.skeleton.image_size;
+        let lens = match &args.lens {
+            None => None,
+            Some(lens) => Some(lens.for_size(size).ok_or_else(|| {
+                let profile = lens.size;
+                CommandError::BadUsage(anyhow!(
+                    "--lens is for pictures of the proportions {profile}, this film is {size}; give \
+                     the profile of its own mode"
+                ))
+            })?),
+        };
+        let profile_s = lens.map_or(0.0, |lens| lens.readout_s);
+        Ok(Self {
+            lens,
+            readout_s: args.readout_ms.map_or(profile_s, |ms| ms / 1000.0),
+            height_px: f64::from(size.height),
+        })
+    }
+
+    fn film(&self, film: &Film) -> Film {
+        let timed = match self.readout_s > 0.0 {
+            true => film.at_middle_rows(self.readout_s, self.height_px),
+            false => film.clone(),
+        };
+        match &self.lens {
+            Some(lens) => timed.moved(|at_px| lens.undistorted(at_px)),
+            None => timed,
+        }
+    }
+
+    fn skeleton(&self, skeleton: &Skeleton) -> Skeleton {
+        match &self.lens {
+            Some(lens) => lens.straighten(skeleton),
+            None => skeleton.clone(),
+        }
+    }
+
+    fn straighten(&self, poses: &mut [Pose], skeleton: &Skeleton) {
+        if let Some(lens) = &self.lens {
+            for pose in poses {
+                lens.straighten_pose(pose, skeleton);
+            }
+        }
+    }
+}
+
+/// The tree of the markers, where they are analysed.
+fn marked_tree(
+    args: &AnalyzeArgs,
+    document: &Document,
+    config: &Config,
+) -> Result<Option<MarkedTree>, DocumentError> {
+    if !args.by_markers() {
+        return Ok(None);
+    }
+    let longest_s = longest_s(args, config);
+    let marked = document.marked_tree(args.marker_parents(), longest_s, args.within_s())?;
+    Ok(Some(marked))
+}
+
+/// Calls the branches as the markers are called in which they end.
+fn name_by_markers(study: &mut Study, marked: &MarkedTree) {
+    for branch in &mut study.branches {
+        if let Some(name) = marked.names.get(&NodeName(branch.name)) {
+            branch.piece.clone_from(name);
+        }
+    }
+}
+
+/// Length of film that is analysed at most, s.
+fn longest_s(args: &AnalyzeArgs, config: &Config) -> f64 {
+    match args.from.is_some() || args.to.is_some() {
+        true => MAX_PART_S,
+        false => config.dynamics.window_s,
+    }
 }
 
 /// The settings for a capture: command line over configuration file over those of the capture.
@@ -267,13 +378,16 @@ fn excitation(setting: Excited) -> Option<Excitation> {
 fn film(
     args: &AnalyzeArgs,
     document: &Document,
+    marked: Option<&MarkedTree>,
     config: &Config,
     notes: &mut Notes,
 ) -> Result<Film, CommandError> {
     let chosen = args.from.is_some() || args.to.is_some();
-    let window_s = config.dynamics.window_s;
-    let longest_s = if chosen { MAX_PART_S } else { window_s };
-    let film = document.tracked_within(longest_s, args.within_s())?;
+    let longest_s = longest_s(args, config);
+    let film = match marked {
+        Some(marked) => marked.film.clone(),
+        None => document.tracked_within(longest_s, args.within_s())?,
+    };
     let duration_s = document.note.timing.duration_s;
     if let Some(from) = args.from
         && film.times_s.is_empty()

@@ -2,6 +2,7 @@
 
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
+use super::markers::MarkerArgs;
 use super::notes::NoteArgs;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
@@ -43,6 +44,8 @@ pub struct Common {
     #[command(flatten)]
     pub strokes: StrokeArgs,
     #[command(flatten)]
+    pub markers: MarkerArgs,
+    #[command(flatten)]
     pub notes: NoteArgs,
 }
 
@@ -62,6 +65,7 @@ impl Common {
             self.scale.set(config);
             self.shape.set(config);
             self.strokes.set(config);
+            self.markers.set(config);
             if let Some(camera) = camera {
                 camera.set(&mut config.camera);
             }

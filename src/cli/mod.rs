@@ -16,6 +16,7 @@ mod forest;
 mod grow;
 mod hangup;
 mod line;
+mod markers;
 mod note;
 mod notes;
 mod output;

@@ -121,6 +121,7 @@ fn job(
     common.shape.check_size(info.size)?;
     common.scale.check_size(info.size)?;
     common.strokes.check_size(info.size)?;
+    common.markers.check_size(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {

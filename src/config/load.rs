@@ -25,6 +25,8 @@ pub enum ConfigError {
         value: f64,
         allowed: &'static str,
     },
+    #[error("markers: {what}")]
+    Markers { what: String },
 }
 
 impl ConfigError {
@@ -136,6 +138,7 @@ impl Config {
                 allowed: "an odd number",
             });
         }
+        super::markers::check(&self.markers.windows, &self.markers.corrections)?;
         check_strokes(&self.skeleton.strokes_px)
     }
 }

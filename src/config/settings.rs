@@ -6,6 +6,7 @@
 //! 640 px" are for a picture 640 pixels wide and grow with the picture.
 
 use super::declare::{choice, first, range, settings};
+use super::markers::{MarkerCorrection, MarkerWindow};
 use super::setting::Effect::{self, NextStart, Now};
 use super::setting::{Choice, Range, Section, Setting, SettingValue};
 use serde::{Deserialize, Serialize};
@@ -91,6 +92,36 @@ settings! {
         steady: bool = true;
         /// A point that is hidden moves with its neighbours for this time before it is given up, s.
         coast_s: f64 [0 to 60] = 5.0;
+    }
+
+    /// Coloured markers on branches, followed by their hue (Hu et al. sect. 5.1). See docs/markers.md.
+    markers: Markers, POINTS {
+        /// Looks for the markers in the first frame: blobs of the hue hue_deg. `--markers auto` sets it.
+        find: bool = false;
+        /// The markers with their windows in the first frame, px; `--markers FILE` sets them.
+        windows: Vec<MarkerWindow> = Vec::new();
+        /// Places of markers in single frames, where they could not be followed; from the same file.
+        corrections: Vec<MarkerCorrection> = Vec::new();
+        /// How a window follows its marker.
+        method: MarkerMethod = MarkerMethod::MeanShift;
+        /// Hue of the markers that are looked for, degrees on the circle of colours: 0 is red, 120
+        /// green, 240 blue.
+        hue_deg: f64 [0 to 360] = 0.0;
+        /// Hues that are no farther from it count as the same, degrees.
+        hue_width_deg: f64 [1 to 90] = 12.0;
+        /// Bins of the histogram of hues.
+        hue_bins: u32 [8 to 180] = 32;
+        /// Pixels with less saturation have no hue. Lower it for pale markers and dim light, raise it
+        /// if the background is taken for markers.
+        least_saturation: u32 [0 to 255] = 100;
+        /// The same for pixels that are darker than this.
+        least_value: u32 [0 to 255] = 50;
+    }
+
+    /// A printed square beside the trunk (AprilTag 36h11), which gives the scale. See docs/markers.md.
+    tag: Tag, SCALE {
+        /// Side of its black square, m; `--tag` sets it.
+        size_m: f64 [0 ("none") to 100] = 0.0;
     }
 
     /// When enough motion has been seen to build the tree.
@@ -310,6 +341,16 @@ settings! {
         /// for each main branch. Otherwise they are one mesh that the branches move, which Blender
         /// reads with one action. Pictures and videos always show the swing.
         leaf_swing: bool = false;
+    }
+}
+
+choice! {
+    /// How a window follows its marker.
+    MarkerMethod {
+        /// the window keeps its size (Hu et al. sect. 5.1)
+        MeanShift = "mean-shift",
+        /// the window grows and shrinks with the marker (Bradski 1998)
+        CamShift = "camshift",
     }
 }
 

@@ -71,6 +71,7 @@ pub fn frames_per_s(config: &Config) -> f64 {
             received: Instant::now(),
             luma,
             preview: None::<Arc<_>>,
+            colour: None,
             raw: None,
         }));
         if n == 0 {

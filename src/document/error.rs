@@ -33,6 +33,10 @@ pub enum DocumentError {
     /// A tree without the film that a command needs.
     #[error("{} lacks {file}: it holds no film; give a capture with its film", .dir.display())]
     NoFilm { dir: PathBuf, file: &'static str },
+    #[error("{} has no coloured markers in this part of its film; follow some with `replay --markers`", .dir.display())]
+    NoMarkers { dir: PathBuf },
+    #[error("{} has no marker {name}; its markers are in capture.json (config.markers.windows)", .dir.display())]
+    UnknownMarker { dir: PathBuf, name: String },
     #[error(transparent)]
     Unwritten(#[from] WriteError),
     #[error("cannot read {}: {source}", .file.display())]

@@ -13,6 +13,7 @@ mod bark;
 mod camera;
 mod error;
 mod forest;
+mod marked;
 mod modes;
 mod motion;
 mod nodes;
@@ -34,6 +35,7 @@ pub use forest::{
     FOREST_FILE, FOREST_TREES_FILE, ForestDocument, ForestFileBytes, ForestNote, ForestOrigin,
     GROUND_FILE, GroundNote, MOST_GROUND_SAMPLES,
 };
+pub use marked::MarkedTree;
 pub use modes::{MODES_FILE, modes};
 pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};

@@ -6,7 +6,7 @@ use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
 use crate::model::{
     CaptureFacts, FilmCut, Judgement, LocalTime, Origin, Outline, Skeleton, SwayFacts, Swaying,
-    Timing, UserNotes, Verdict,
+    TagScale, Timing, UserNotes, Verdict,
 };
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
@@ -42,6 +42,9 @@ pub struct CaptureNote {
     pub outline: Option<OutlineNote>,
     /// `None` where nothing was tracked, or no frame could be decoded in colour.
     pub picture: Option<PictureNote>,
+    /// What a printed tag beside the trunk says of the scale; `None` where none was seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tag: Option<TagScale>,
     /// `None` where no trunk was seen: the bark's colour is a guess then.
     pub bark: Option<BarkNote>,
     /// `None` but for trees that were grown like one whose film shows its leaves.
@@ -402,6 +405,7 @@ impl CaptureNote {
             outline,
             picture: None,
             bark: None,
+            tag: None,
             leaves: None,
             masks: None,
             scan: None,

@@ -102,6 +102,58 @@ pub(super) fn read_film(
     window_s: f64,
     within_s: Bounds,
 ) -> Result<Film, DocumentError> {
+    let points = read_points(dir, skeleton, window_s, within_s)?;
+    Ok(points.film(skeleton))
+}
+
+/// Points of a film, without the camera's motion, and on which node each of them is.
+pub(super) struct PointsRead {
+    log: TrackLog,
+    node_of: BTreeMap<TrackId, NodeId>,
+}
+
+impl PointsRead {
+    /// The points that are on nodes of `skeleton`.
+    fn film(&self, skeleton: &Skeleton) -> Film {
+        Film::from_log(self.log.all(), skeleton, |id| {
+            self.node_of.get(&id).copied()
+        })
+    }
+
+    /// The points that `node_of` puts on nodes of another skeleton.
+    pub fn film_on(
+        &self,
+        skeleton: &Skeleton,
+        node_of: impl Fn(TrackId) -> Option<NodeId>,
+    ) -> Film {
+        Film::from_log(self.log.all(), skeleton, node_of)
+    }
+
+    /// The node that a point is on; `None` where on none.
+    pub fn node(&self, id: TrackId) -> Option<NodeId> {
+        self.node_of.get(&id).copied()
+    }
+
+    /// Where a point was seen, px.
+    pub fn places_px(&self, id: TrackId) -> Vec<Point2<f64>> {
+        let sets = self.log.all();
+        let seen = sets.sets().flat_map(|set| &set.observations);
+        seen.filter(|o| o.id == id)
+            .map(Observation::at_px)
+            .collect()
+    }
+}
+
+/// What [`read_film`] reads, before it is put on nodes.
+///
+/// # Errors
+/// As for [`read_film`].
+pub(super) fn read_points(
+    dir: &Path,
+    skeleton: &Skeleton,
+    window_s: f64,
+    within_s: Bounds,
+) -> Result<PointsRead, DocumentError> {
     let nodes = skeleton.nodes.iter().zip(0..);
     let by_name: BTreeMap<NodeName, NodeId> = nodes.map(|(n, i)| (n.name, NodeId(i))).collect();
     let mut tables = vec![TracksReader::open(dir, TRACKS_FILE, &by_name)?];
@@ -134,9 +186,7 @@ pub(super) fn read_film(
         }
         push(&mut log, time_s, observations);
     }
-    Ok(Film::from_log(log.all(), skeleton, |id| {
-        node_of.get(&id).copied()
-    }))
+    Ok(PointsRead { log, node_of })
 }
 
 /// Reads a table of points row by row.

@@ -84,6 +84,40 @@ impl Film {
         Self::new(&times_s, tracks.into_values().flatten().collect())
     }
 
+    /// The same points, each at another place of the picture.
+    pub fn moved(&self, to: impl Fn(Point2<f64>) -> Point2<f64>) -> Self {
+        let mut film = self.clone();
+        for at_px in film.tracks.iter_mut().flat_map(|track| &mut track.at_px) {
+            *at_px = to(*at_px);
+        }
+        film
+    }
+
+    /// The points where they are when the middle row of each frame is read, of a camera that reads the
+    /// rows of a picture of this height one after the other within `readout_s`, s: each is carried back
+    /// from when its own row is read, by its speed and acceleration there (a Taylor series).
+    pub fn at_middle_rows(&self, readout_s: f64, height_px: f64) -> Self {
+        let mut film = self.clone();
+        for (track, carried) in self.tracks.iter().zip(&mut film.tracks) {
+            for k in 1..self.times_s.len().max(1) - 1 {
+                let [before, at, after] = [k - 1, k, k + 1].map(|k| track.at_px[k]);
+                let late_s = (at.y / height_px - 0.5) * readout_s;
+                let [first_s, last_s] = [
+                    self.times_s[k] - self.times_s[k - 1],
+                    self.times_s[k + 1] - self.times_s[k],
+                ];
+                let (back, ahead) = ((at - before) / first_s, (after - at) / last_s);
+                let speed = (last_s * back + first_s * ahead) / (first_s + last_s);
+                let acceleration = 2.0 * (ahead - back) / (first_s + last_s);
+                let there = at - late_s * speed + 0.5 * late_s * late_s * acceleration;
+                if there.x.is_finite() && there.y.is_finite() {
+                    carried.at_px[k] = there;
+                }
+            }
+        }
+        film
+    }
+
     /// From the time of the first frame to that of the last, s.
     pub fn span_s(&self) -> f64 {
         self.times_s
@@ -161,6 +195,32 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A point at the lower edge, 10 ms after the middle row of each frame: its phase is that of the middle
+    /// row to a tenth of a degree, and was 7 degrees off.
+    #[test]
+    fn points_are_carried_to_when_the_middle_row_is_read() {
+        let turn = std::f64::consts::TAU * 2.0;
+        let times_s: Vec<f64> = (0..60).map(|k| f64::from(k) / 30.0).collect();
+        let filmed = times_s
+            .iter()
+            .map(|t| Point2::new(5.0 * (turn * (t + 0.01)).sin(), 360.0));
+        let track = FilmTrack {
+            node: NodeId(1),
+            at_px: filmed.collect(),
+        };
+        let film = Film::new(&times_s, vec![track]).at_middle_rows(0.02, 360.0);
+        for (t, at) in times_s.iter().zip(&film.tracks[0].at_px).skip(1).take(58) {
+            let off = at.x - 5.0 * (turn * t).sin();
+            assert!(off.abs() < 0.03, "at {t} s {off} px off");
+        }
+        assert!(
+            Film::default()
+                .at_middle_rows(0.02, 360.0)
+                .tracks
+                .is_empty()
+        );
+    }
 
     /// Ten minutes of points are some hundred megabytes: no copy is made of a film that is used
     /// whole.

@@ -12,6 +12,8 @@ pub enum Control {
     AddStroke(Vec<Point2<f64>>),
     /// Do without the line along a branch that came last.
     TakeBackStroke,
+    /// Follow the coloured markers at these places, px, from the next frame on.
+    PickMarkers(Vec<Point2<f64>>),
     /// Build the tree from the motion seen so far.
     BuildNow,
     /// Forget tracks and tree, keep the outline rule, start again.

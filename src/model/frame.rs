@@ -250,6 +250,8 @@ pub struct Frame {
     pub luma: Luma,
     /// A smaller picture in colour for the screen, made for some frames only.
     pub preview: Option<Arc<Rgb>>,
+    /// The whole picture in colour, where coloured markers are followed.
+    pub colour: Option<Rgb>,
     /// The frame as it came, from which its colours can be had later; `None` where only the luma is
     /// known.
     pub raw: Option<Arc<RawFrame>>,

@@ -7,6 +7,21 @@ use nalgebra::Point2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrackId(pub u32);
 
+/// The id of the first coloured marker among the tracks; points never get so many.
+const FIRST_MARKER_ID: u32 = 1_000_000_000;
+
+impl TrackId {
+    /// The id of marker `k`, in the order in which the markers were given or found.
+    pub fn of_marker(k: usize) -> Self {
+        Self(FIRST_MARKER_ID.saturating_add(u32::try_from(k).unwrap_or(u32::MAX)))
+    }
+
+    /// Which marker it is; `None` for a point.
+    pub fn marker(self) -> Option<usize> {
+        self.0.checked_sub(FIRST_MARKER_ID).map(|k| k as usize)
+    }
+}
+
 /// Within this time of its birth it is decided whether a point is kept, s; for the first of a
 /// capture, within this time of the tree's first stirring. What has not stirred makes no tree, and
 /// rows are written only after a build.

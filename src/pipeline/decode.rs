@@ -1,5 +1,6 @@
 //! The first stage: raw frames to the tracker's pictures.
 
+use crate::config::Config;
 use crate::model::{Frame, Luma, RawFrame, Rgb, Size, TimedFrame};
 use crate::source::{DecodeError, Decoder};
 use std::sync::Arc;
@@ -28,6 +29,8 @@ pub struct DecodeStage {
     live: bool,
     /// `None` makes no pictures for a screen.
     preview_every_s: Option<f64>,
+    /// Every frame gets its whole picture in colour.
+    wants_colour: bool,
     /// Sensor time of the last picture for the screen, s.
     last_preview_s: Option<f64>,
     size: Option<Size>,
@@ -46,10 +49,26 @@ impl DecodeStage {
             decoder: Decoder::new()?,
             live,
             preview_every_s: preview_every.map(|every| every.as_secs_f64()),
+            wants_colour: false,
             last_preview_s: None,
             size: None,
             other_sizes: 0,
         })
+    }
+
+    /// For a film that is read, not for a live camera, and without pictures for a screen.
+    ///
+    /// # Errors
+    /// There is no decoder.
+    pub fn of_film(config: &Config) -> Result<Self, DecodeError> {
+        let mut stage = Self::new(false, None)?;
+        stage.set_wants_colour(config.markers.are_wanted());
+        Ok(stage)
+    }
+
+    /// From the next frame on each gets its whole picture in colour, or not.
+    pub fn set_wants_colour(&mut self, wants_colour: bool) {
+        self.wants_colour = wants_colour;
     }
 
     /// Size of the pictures, once one was decoded.
@@ -66,12 +85,17 @@ impl DecodeStage {
             .luma(&timed.raw, spare)
             .map_err(|e| self.undecoded(e))?;
         (self.size, self.other_sizes) = (Some(luma.size), 0);
+        let colour = match self.wants_colour {
+            true => self.colour(&timed.raw, timed.raw.size.width),
+            false => None,
+        };
         Ok(Frame {
             index: timed.index,
             time_s: timed.time_s,
             received: timed.received,
             luma,
             preview: self.preview(timed),
+            colour,
             raw: Some(timed.raw.clone()),
         })
     }

@@ -1,10 +1,14 @@
 //! The front end: frame to tracks.
 
 use super::back::Followed;
-use crate::config::Config;
+use super::marked::MarkerStage;
+use super::tagged::{TagNews, TagStage};
+use crate::config::{Config, MarkerWindow};
+use crate::markers::{MarkerError, MarkerEvent, MarkerPlace};
 use crate::model::{Frame, Luma, Outline};
 use crate::outline::{AutoOutline, Found};
 use crate::track::{Tracker, WholeView};
+use nalgebra::Point2;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -23,7 +27,9 @@ pub struct FrontEnd {
     /// The camera's motion while the outline is looked for.
     view: WholeView,
     found: Option<(Arc<Outline>, Tracker)>,
-    held: VecDeque<Frame>,
+    held: VecDeque<Held>,
+    markers: MarkerStage,
+    tag: TagStage,
     next_id: u32,
     spare: Option<Luma>,
     progress: f64,
@@ -41,6 +47,8 @@ impl FrontEnd {
             view: WholeView::new(&config.track),
             found: None,
             held: VecDeque::new(),
+            markers: MarkerStage::new(&config.markers),
+            tag: TagStage::new(&config.tag),
             next_id: 0,
             spare: None,
             progress: 0.0,
@@ -61,14 +69,16 @@ impl FrontEnd {
                 None => self.search_in(&frame),
             }
         }
-        self.held.push_back(frame);
+        self.tag.step(&frame);
+        let markers = self.markers.step(&mut frame, self.given.as_deref());
+        self.held.push_back(Held { frame, markers });
         if self.found.is_none() {
-            while self.held.iter().map(bytes_of).sum::<usize>() > HELD_BYTES {
+            while self.held.iter().map(Held::bytes).sum::<usize>() > HELD_BYTES {
                 self.held.pop_front();
                 self.let_go += 1;
             }
             if let Some(first) = self.held.front() {
-                self.search.begin_at(first.time_s);
+                self.search.begin_at(first.frame.time_s);
             }
             return Vec::new();
         }
@@ -79,8 +89,10 @@ impl FrontEnd {
     /// Works off all held frames; an outline that was still looked for is what the frames so far
     /// show.
     pub fn flush(&mut self) -> Vec<Followed> {
+        self.markers.finish();
+        self.tag.finish();
         if self.found.is_none()
-            && let Some(size) = self.held.back().map(|f| f.luma.size)
+            && let Some(size) = self.held.back().map(|held| held.frame.luma.size)
         {
             let outline = self.search.conclude(size);
             self.no_motion = outline.is_none();
@@ -110,12 +122,37 @@ impl FrontEnd {
 
     /// The oldest of the frames that are held back.
     pub fn oldest_held(&self) -> Option<u64> {
-        self.held.front().map(|f| f.index)
+        self.held.front().map(|held| held.frame.index)
     }
 
     /// A picture buffer that is no longer needed, to decode the next frame into.
     pub fn spare(&mut self) -> Option<Luma> {
         self.spare.take()
+    }
+
+    /// What has become of the tag since the last call.
+    pub fn take_tag_news(&mut self) -> Vec<TagNews> {
+        self.tag.take_news()
+    }
+
+    /// What has become of markers since the last call.
+    pub fn take_marker_events(&mut self) -> Vec<MarkerEvent> {
+        self.markers.take_events()
+    }
+
+    /// Why markers could not be followed from the first frame on; once.
+    pub fn take_marker_error(&mut self) -> Option<MarkerError> {
+        self.markers.take_error()
+    }
+
+    /// The markers as they were given, found or picked, where that has changed since the last call.
+    pub fn take_new_markers(&mut self) -> Option<Vec<MarkerWindow>> {
+        self.markers.take_new()
+    }
+
+    /// Follows more markers, that are picked at these places, px, of the next frame.
+    pub fn pick_markers(&mut self, places_px: Vec<Point2<f64>>) {
+        self.markers.pick(places_px);
     }
 
     /// Looks for the outline in one more frame.
@@ -143,8 +180,9 @@ impl FrontEnd {
 
     fn follow_next(&mut self) -> Option<Followed> {
         let (outline, tracker) = self.found.as_mut()?;
-        let frame = self.held.pop_front()?;
-        let tracks = tracker.step(&frame);
+        let Held { frame, markers } = self.held.pop_front()?;
+        let mut tracks = tracker.step(&frame);
+        MarkerStage::join(&markers, &mut tracks);
         self.spare = Some(frame.luma);
         Some(Followed {
             tracks,
@@ -156,9 +194,17 @@ impl FrontEnd {
     }
 }
 
-/// Memory that a frame takes, bytes.
-fn bytes_of(frame: &Frame) -> usize {
-    let preview = frame.preview.as_ref().map_or(0, |p| p.pixels.len());
-    let raw = frame.raw.as_ref().map_or(0, |raw| raw.bytes.len());
-    frame.luma.pixels.len() + preview + raw
+/// A frame that waits to be worked off, and the markers in it.
+struct Held {
+    frame: Frame,
+    markers: Vec<MarkerPlace>,
+}
+
+impl Held {
+    /// Memory that it takes, bytes.
+    fn bytes(&self) -> usize {
+        let preview = self.frame.preview.as_ref().map_or(0, |p| p.pixels.len());
+        let raw = self.frame.raw.as_ref().map_or(0, |raw| raw.bytes.len());
+        self.frame.luma.pixels.len() + preview + raw
+    }
 }

@@ -18,8 +18,8 @@ use crate::document::{
 use crate::dynamics::{Depth, Film, Take};
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, Tentative, Timing, TrackLog,
-    TrackSet, Unidentified, Verdict, WoodSeen,
+    AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, TagScale, Tentative, Timing,
+    TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -143,6 +143,8 @@ pub struct CaptureJob {
     pub info: SourceInfo,
     pub quality: Quality,
     pub picture: Option<Picture>,
+    /// What a tag beside the trunk says of the scale.
+    pub tag: Option<TagScale>,
     pub shared: Arc<Shared>,
 }
 
@@ -383,6 +385,7 @@ pub(super) fn describe(
             frame: p.frame,
             time_s: p.time_s,
         }),
+        tag: job.tag,
         leaves: None,
         scan: None,
         bark: tree.and_then(bark_of).map(|_| BarkNote {

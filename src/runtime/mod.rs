@@ -106,7 +106,8 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
     // Wishes are typed by a person; they cannot pile up.
     let (controls, wishes) = unbounded();
     let (region, scribbles) = parted(job.outline.take());
-    let decode = DecodeStage::new(info.live, job.preview_every).map_err(Failure::NoDecoder)?;
+    let mut decode = DecodeStage::new(info.live, job.preview_every).map_err(Failure::NoDecoder)?;
+    decode.set_wants_colour(job.config.markers.are_wanted());
     let front = FrontEnd::new(&job.config, region);
     let (pace, length_s, camera) = (job.pace, job.length_s, job.config.camera.clone());
 

@@ -20,9 +20,9 @@ use super::table_writer::TableWriter;
 use super::track_thread::ToModel;
 use super::unfinished::Unfinished;
 use crate::cancel::CancelToken;
-use crate::config::Config;
+use crate::config::{Config, MarkerWindow};
 use crate::dynamics::Take;
-use crate::model::{CaptureFacts, Phase, Picture, Pose, SwayNow, Verdict};
+use crate::model::{CaptureFacts, Phase, Picture, Pose, SwayNow, TagScale, Verdict};
 use crate::pipeline::{BackEnd, Followed, Moved};
 use crate::recording::TrackFile;
 use crate::solve::{LEAST_MOVING, Model};
@@ -70,6 +70,7 @@ pub struct ModelThread {
     /// Sensor time up to which the tables have been asked for, s.
     tables_s: f64,
     picture: Option<Picture>,
+    tag: Option<TagScale>,
     quality: Quality,
     last_screen: Option<Instant>,
     export: Option<Pending<()>>,
@@ -109,6 +110,7 @@ impl ModelThread {
             verdict: LiveVerdict::default(),
             tables_s: f64::NEG_INFINITY,
             picture: None,
+            tag: None,
             quality: Quality::default(),
             last_screen: None,
             export: None,
@@ -151,6 +153,8 @@ impl ModelThread {
                 self.verdict.see(&picture);
                 self.picture = Some(picture);
             }
+            ToModel::Tag(scale) => self.take_tag(scale),
+            ToModel::Markers(markers) => self.take_markers(markers),
             ToModel::Followed(followed) => *last = Some(self.step(followed)),
             ToModel::Searching {
                 progress,
@@ -184,6 +188,24 @@ impl ModelThread {
             }
             ToModel::Export => self.export_now(),
         }
+    }
+
+    /// A tag gives the scale: the first sights fix it for the whole capture, whose files have one unit.
+    fn take_tag(&mut self, scale: TagScale) {
+        if self.tag.is_none() {
+            self.job.config.export.metres_per_px = scale.metres_per_px;
+        }
+        self.tag = Some(scale);
+    }
+
+    /// Markers were found, or one was picked: the capture is to name them.
+    fn take_markers(&mut self, markers: Vec<MarkerWindow>) {
+        let n = markers.len();
+        self.shared.tell(match n {
+            1 => "1 marker is followed".to_owned(),
+            n => format!("{n} markers are followed"),
+        });
+        self.job.config.markers.windows = markers;
     }
 
     /// The user has drawn a line along a branch, or taken one back.
@@ -449,6 +471,7 @@ impl ModelThread {
             info: self.info.clone(),
             quality: self.quality.clone(),
             picture: self.picture.clone(),
+            tag: self.tag,
             shared: self.shared.clone(),
         })
     }
@@ -457,6 +480,8 @@ impl ModelThread {
     fn effective_config(&self) -> Config {
         let reloaded = self.shared.reloaded();
         let mut config = reloaded.unwrap_or_else(|| self.job.config.clone());
+        config.export.metres_per_px = self.job.config.export.metres_per_px;
+        config.markers.windows = self.job.config.markers.windows.clone();
         config.skeleton.strokes_px = self.back.strokes_px().to_vec();
         config
     }

@@ -4,6 +4,7 @@ use super::latest::Latest;
 use super::pulse::Pulse;
 use crate::config::Config;
 use crate::files::WriteError;
+use crate::markers::MarkerError;
 use crate::model::{CameraState, Gap, LocalTime, Origin, Snapshot, Timing};
 use crate::recording::RecordingError;
 use crate::source::{ClockKind, DecodeError, SourceError};
@@ -61,6 +62,8 @@ pub enum Failure {
     /// The pictures changed their size.
     #[error("frame {frame}: {error}")]
     Frame { frame: u64, error: DecodeError },
+    #[error("--markers: {0}")]
+    Markers(MarkerError),
     #[error("no frame could be decoded; the last error was: {0}")]
     NothingDecoded(DecodeError),
     #[error("a worker thread of the capture ended unexpectedly; please report this")]

@@ -4,9 +4,10 @@
 use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
-use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TimedFrame};
+use crate::config::MarkerWindow;
+use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TimedFrame};
 use crate::outline::{self, Scribbles};
-use crate::pipeline::{DecodeStage, Followed, FrontEnd, Undecoded};
+use crate::pipeline::{DecodeStage, Followed, FrontEnd, TagNews, Undecoded};
 use crate::source::DecodeError;
 use crossbeam_channel::{Receiver, Sender, select};
 use std::sync::Arc;
@@ -18,11 +19,19 @@ const MATTING_WIDTH: u32 = 960;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
 
+/// The warning where no tag is seen that was said to be there.
+const NO_TAG: &str = "no tag of the family 36h11 is seen: lengths stay in pixels; print it larger, with its \
+                      white rim, or hang it in the light (--tag)";
+
 /// What the model thread gets.
 pub enum ToModel {
     /// Of the frame that follows.
     Picture(Picture),
     Followed(Followed),
+    /// What the tag beside the trunk says.
+    Tag(TagScale),
+    /// The markers as they were given, found or picked.
+    Markers(Vec<MarkerWindow>),
     /// The outline is still looked for: how far, and a picture to look at.
     Searching {
         progress: f64,
@@ -101,6 +110,7 @@ impl<'a> TrackThread<'a> {
             }
         }
         self.report();
+        self.report_markers();
     }
 
     fn honour(&mut self, wish: Control) {
@@ -121,6 +131,10 @@ impl<'a> TrackThread<'a> {
                 self.pass_on(ToModel::AddStroke(stroke_px));
             }
             Control::TakeBackStroke => drop(self.pass_on(ToModel::TakeBackStroke)),
+            Control::PickMarkers(places_px) => {
+                self.decode.set_wants_colour(true);
+                self.front.pick_markers(places_px);
+            }
             Control::Restart => self.restart(None),
             Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
             Control::Export => drop(self.pass_on(ToModel::Export)),
@@ -174,6 +188,11 @@ impl<'a> TrackThread<'a> {
         self.solve_scribbles(timed, preview.clone());
         let done = self.front.step(frame);
         self.report();
+        self.report_markers();
+        if let Some(e) = self.front.take_marker_error() {
+            self.shared.abort(Failure::Markers(e));
+            return false;
+        }
         if let Some(progress) = self.front.searching() {
             let (size, frame, time_s) = (timed.raw.size, timed.index, timed.time_s);
             return self.pass_on(ToModel::Searching {
@@ -238,6 +257,29 @@ impl<'a> TrackThread<'a> {
         self.last_damage = Some(e);
     }
 
+    /// Says what became of markers and the tag, and hands on which there are.
+    fn report_markers(&mut self) {
+        for event in self.front.take_marker_events() {
+            match event.is_warning() {
+                true => self.shared.warn(event.to_string()),
+                false => self.shared.tell(event.to_string()),
+            }
+        }
+        for news in self.front.take_tag_news() {
+            match news {
+                TagNews::Scale(scale) => {
+                    self.shared.tell(tag_line(&scale));
+                    self.pass_on(ToModel::Tag(scale));
+                }
+                TagNews::Seen(scale) => drop(self.pass_on(ToModel::Tag(scale))),
+                TagNews::NoneSeen => self.shared.warn(NO_TAG.into()),
+            }
+        }
+        if let Some(markers) = self.front.take_new_markers() {
+            self.pass_on(ToModel::Markers(markers));
+        }
+    }
+
     fn report(&mut self) {
         self.shared
             .counts
@@ -257,4 +299,15 @@ impl<'a> TrackThread<'a> {
             self.shared.fail(Failure::NothingDecoded(e.clone()));
         }
     }
+}
+
+/// What the user hears of a tag.
+fn tag_line(scale: &TagScale) -> String {
+    format!(
+        "tag {}: a pixel is {:.5} m at the tree, within {:.1} %; it leans by {:.1} degrees",
+        scale.id,
+        scale.metres_per_px,
+        100.0 * scale.relative_error(),
+        scale.roll_deg
+    )
 }

@@ -281,6 +281,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         config: note.config,
         quality,
         picture,
+        tag: note.tag,
         shared,
     };
     let written = finish::write(&job, &out)?;

@@ -100,7 +100,9 @@ fn draw_line(
 /// What the user draws, its corners, and the keyboard's cursor.
 fn draw_drawing(raster: &mut Raster, drawing: &Drawing, placed: &Placed, fine: i64) {
     let points = drawing.points_px();
-    draw_line(raster, points, drawing.is_closed(), placed, fine, DRAWN);
+    if drawing.is_joined() {
+        draw_line(raster, points, drawing.is_closed(), placed, fine, DRAWN);
+    }
     for p in points {
         // In a coarse picture a corner with a border would hide what it is set on.
         if fine > 0 {
@@ -143,10 +145,12 @@ pub fn letters(state: &State, placed: &Placed) -> Option<Vec<Vec<char>>> {
     letters.strokes(&strokes);
     let letter = match drawing.subject() {
         Subject::Outline => '#',
-        Subject::Branch => STROKE_LETTER,
+        Subject::Branch | Subject::Markers => STROKE_LETTER,
     };
-    for [a, b] in edges(drawing.points_px(), drawing.is_closed()) {
-        letters.line(a, b, letter);
+    if drawing.is_joined() {
+        for [a, b] in edges(drawing.points_px(), drawing.is_closed()) {
+            letters.line(a, b, letter);
+        }
     }
     for p in drawing.points_px() {
         letters.point(*p, 'O');

@@ -1,4 +1,5 @@
-//! What the user draws on the picture, while he draws it: an outline, or a line along a branch.
+//! What the user draws on the picture, while he draws it: an outline, a line along a branch, or places of
+//! coloured markers.
 
 use nalgebra::Point2;
 
@@ -10,6 +11,8 @@ pub enum Subject {
     Outline,
     /// A line along a branch.
     Branch,
+    /// Coloured markers, each by a point.
+    Markers,
 }
 
 impl Subject {
@@ -18,6 +21,7 @@ impl Subject {
         match self {
             Subject::Outline => "the outline",
             Subject::Branch => "a line along a branch",
+            Subject::Markers => "coloured markers",
         }
     }
 }
@@ -75,6 +79,11 @@ impl Drawing {
         self.subject == Subject::Outline && self.points_px.len() >= 3
     }
 
+    /// Whether neighbouring points are joined by lines.
+    pub fn is_joined(&self) -> bool {
+        self.subject != Subject::Markers
+    }
+
     /// The finished polygon, not repeating its first point, or the finished line.
     ///
     /// # Errors
@@ -85,7 +94,10 @@ impl Drawing {
             Subject::Branch if self.points_px.len() < 2 => {
                 Err("A line needs at least 2 points; go on, or leave with Esc.")
             }
-            Subject::Branch => Ok(self.points_px.clone()),
+            Subject::Markers if self.points_px.is_empty() => {
+                Err("Click on a marker first, or leave with Esc.")
+            }
+            Subject::Branch | Subject::Markers => Ok(self.points_px.clone()),
         }
     }
 

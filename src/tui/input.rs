@@ -69,7 +69,7 @@ pub const fn bind<A>(
 }
 
 /// Keys while watching; those without a short name repeat what another one does.
-pub const WATCHING: [Binding<Action>; 19] = [
+pub const WATCHING: [Binding<Action>; 20] = [
     bind(
         KeyCode::Char('?'),
         "?",
@@ -142,6 +142,13 @@ pub const WATCHING: [Binding<Action>; 19] = [
         Action::Draw(Subject::Branch),
     ),
     bind(KeyCode::Char('w'), "w", "wood", "", Action::Wood),
+    bind(
+        KeyCode::Char('c'),
+        "c",
+        "colour",
+        "picks coloured markers, which are followed from then on",
+        Action::Draw(Subject::Markers),
+    ),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
     bind(KeyCode::Char('k'), "", "", "", Action::Choose(-1)),
     bind(KeyCode::Left, "", "", "", Action::Turn(-1)),
@@ -334,7 +341,7 @@ fn begin_drawing(subject: Subject, state: &mut State) {
     }
     state.help = false;
     match subject {
-        Subject::Outline => state.unsay(),
+        Subject::Outline | Subject::Markers => state.unsay(),
         Subject::Branch => state.say(wood::told(&state.snapshot)),
     }
     state.drawing.get_or_insert_with(|| Drawing::of(subject));
@@ -401,6 +408,10 @@ fn use_drawn(subject: Subject, points_px: Vec<Point2<f64>>, state: &mut State) -
         Subject::Branch => {
             state.say(format!("Asked to look for wood along your {n} points."));
             Control::AddStroke(points_px)
+        }
+        Subject::Markers => {
+            state.say(format!("Asked to follow {n} more markers."));
+            Control::PickMarkers(points_px)
         }
     }
 }

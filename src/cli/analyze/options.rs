@@ -1,14 +1,18 @@
 //! Options of `arborcam analyze`.
 
 use super::super::command_error::CommandError;
-use super::super::common::moment;
+use super::super::common::{moment, parse_within};
+use super::super::markers::MarkerFile;
 use super::super::scale::ScaleArgs;
 use crate::bounds::Bounds;
-use crate::config::{Config, ConfigError, Excited};
+use crate::config::{Config, ConfigError, Excited, MarkerWindow};
+use crate::import::read_lens_profile;
+use crate::model::Lens;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 #[derive(Debug, Args)]
 pub struct AnalyzeArgs {
@@ -44,6 +48,19 @@ pub struct AnalyzeArgs {
     /// the same place, and compares nothing if that is ambiguous.
     #[arg(long, value_name = "WHICH", default_value = "auto")]
     pub trees: Trees,
+    /// Analyse the coloured markers (`capture --markers`) in place of the branches of the tree: each is
+    /// the end of a branch that begins at its parent. A file as for `--markers` names the parents;
+    /// without it those of the capture count, or the motion. Write --markers=FILE.
+    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true, conflicts_with = "update")]
+    markers: Option<Option<MarkerParents>>,
+    /// Profile of the camera's lens (JSON of Gyroflow's lens_profiles, or from config/lenses): points are
+    /// put where a camera without distortion would show them, and at the time at which their row is read.
+    #[arg(long, value_name = "FILE", value_parser = lens, conflicts_with = "update")]
+    pub lens: Option<Lens>,
+    /// Time in which a rolling shutter reads a frame from its first to its last row, ms; over that of the
+    /// lens profile.
+    #[arg(long, value_name = "MS", value_parser = readout, conflicts_with = "update")]
+    pub readout_ms: Option<f64>,
     #[command(flatten)]
     pub scale: ScaleArgs,
     /// Settings that differ from those of the capture (TOML; see config/arborcam.toml).
@@ -56,6 +73,33 @@ enum ExcitationArg {
     Auto,
     Release,
     Wind,
+}
+
+/// Reads a lens profile.
+fn lens(path: &str) -> Result<Lens, String> {
+    let bytes = std::fs::read(path).map_err(|e| format!("{e}; give a file"))?;
+    read_lens_profile(&bytes)
+}
+
+/// Parses the time in which a frame is read, ms.
+fn readout(text: &str) -> Result<f64, String> {
+    parse_within(
+        text,
+        0.0..=1000.0,
+        "give a number of milliseconds, 0 to 1000",
+    )
+}
+
+/// Markers with their parents, from a file.
+#[derive(Clone, Debug)]
+struct MarkerParents(Vec<MarkerWindow>);
+
+impl FromStr for MarkerParents {
+    type Err = String;
+
+    fn from_str(path: &str) -> Result<Self, String> {
+        MarkerFile::read(path).map(|file| Self(file.markers))
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -106,6 +150,17 @@ impl AnalyzeArgs {
             )),
             _ => Ok(()),
         }
+    }
+
+    /// Whether markers are analysed in place of branches.
+    pub fn by_markers(&self) -> bool {
+        self.markers.is_some()
+    }
+
+    /// The parents of markers that a file names.
+    pub fn marker_parents(&self) -> Option<&[MarkerWindow]> {
+        let file = self.markers.as_ref()?.as_ref()?;
+        Some(&file.0)
     }
 
     /// Begin and end of the analysed part of the film, s.

@@ -1,0 +1,116 @@
+#!/usr/bin/env python3
+"""How well a built arborcam follows coloured markers, and what frequencies it finds by them.
+
+  markers_told.py ARBORCAM FILM_DIR... [--auto] [--out DIR]
+
+Why: Hu et al. (sect. 5) measure trees by red markers. FILM_DIR are films of made_films.py --markers. Each is replayed with the
+windows of its markers.json, or with --auto with `--markers auto`; then `analyze --markers` is asked for the branches by hand.
+One row a film:
+  markers   followed, of those that there are       err px    median and 95 % of the distance from the true place
+  seen      share of the frames without the board   lost      markers that are not seen in the last two seconds
+  board     px between the true place and the hidden marker's in the two seconds after the board, median
+  first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
+"""
+import argparse, csv, json, subprocess, tempfile
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+FIRST_ID = 1_000_000_000
+END_S = 2.0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("arborcam", type=Path)
+    parser.add_argument("films", type=Path, nargs="+")
+    parser.add_argument("--auto", action="store_true")
+    parser.add_argument("--out", type=Path, help="keeps the captures there")
+    args = parser.parse_args()
+    args.arborcam = args.arborcam.resolve()
+    print(f"{'film':<12}{'markers':>9}{'err px':>8}{'95 %':>7}{'worst':>7}{'seen':>7}{'lost':>6}{'board':>7}{'first Hz':>10}{'peak':>8}{'true':>8}")
+    with tempfile.TemporaryDirectory() as work:
+        rows = [row(args, film, (args.out or Path(work)) / film.name) for film in args.films]
+    errors = np.concatenate([r["errors"] for r in rows])
+    print(f"all films: median {np.median(errors):.2f} px, 95 % {np.quantile(errors, 0.95):.2f} px, lost {sum(r['lost'] for r in rows)}")
+    for name in ("analysis", "peak"):
+        off = np.array([r[name] - r["true_hz"] for r in rows])
+        told = np.isfinite(off)
+        print(f"first frequency by {name}: {told.sum()} of {len(off)}, largest error {np.abs(off[told]).max(initial=0):.4f} Hz, "
+              f"within 0.01 Hz {np.sum(np.abs(off[told]) <= 0.01)}")
+
+
+def row(args, film, out):
+    truth = json.loads((film / "truth_markers.json").read_text())
+    spec = "auto" if args.auto else str(film / "markers.json")
+    subprocess.run([args.arborcam, "replay", film / "video.mkv", "--outline", film / "outline.json", "--markers", spec, "--fast",
+                    "--headless", "--out", out], check=True, capture_output=True)
+    seen = places(out)
+    matched = match(truth["markers"], seen)
+    errors, shares, lost, board = [], [], 0, np.nan
+    for marker in truth["markers"]:
+        true_px = np.array(marker["places_px"])
+        found = seen.get(matched.get(marker["name"]), {})
+        frames = np.array(sorted(found), int)
+        off = np.array([np.hypot(*(np.array(found[f]) - true_px[f])) for f in frames])
+        errors.append(off)
+        hidden = truth["hidden"] if truth["hidden"] and truth["hidden"]["name"] == marker["name"] else None
+        free = len(true_px) - (0 if hidden is None else round(30 * (hidden["to_s"] - hidden["from_s"])))
+        shares.append(len(frames) / free)
+        lost += not (frames >= len(true_px) - 30 * END_S).any()
+        if hidden is not None:
+            after = (frames >= 30 * hidden["to_s"]) & (frames < 30 * (hidden["to_s"] + 2))
+            board = np.median(off[after]) if after.any() else np.inf
+    errors = np.concatenate(errors)
+    trunk = truth["markers"][0]
+    analysis, peak = frequencies(args.arborcam, film, out, trunk["name"])
+    true_hz = trunk["freq_hz"] * np.sqrt(1 - trunk["damping"] ** 2)
+    print(f"{film.name:<12}{len(matched):>5}/{len(truth['markers']):<3}{np.median(errors):>8.2f}{np.quantile(errors, 0.95):>7.2f}"
+          f"{errors.max():>7.1f}{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
+    return dict(errors=errors, lost=lost, analysis=analysis, peak=peak, true_hz=true_hz)
+
+
+def places(capture):
+    """By marker number: frame to place, px."""
+    seen = defaultdict(dict)
+    for name in ("tracks.csv", "left_out.csv"):
+        if not (capture / name).exists():
+            continue
+        with open(capture / name) as f:
+            for r in csv.DictReader(f):
+                if int(r["track_id"]) >= FIRST_ID:
+                    seen[int(r["track_id"]) - FIRST_ID][int(r["frame"])] = (float(r["u_px"]), float(r["v_px"]))
+    return seen
+
+
+def match(markers, seen):
+    """Name of each true marker to the number of the one that is nearest in its first frame."""
+    matched = {}
+    for number, found in seen.items():
+        frame = min(found)
+        off = [np.hypot(*(np.array(m["places_px"][frame]) - found[frame])) for m in markers]
+        if min(off) < 10:
+            matched.setdefault(markers[int(np.argmin(off))]["name"], number)
+    return matched
+
+
+def frequencies(arborcam, film, capture, name):
+    """Of one marker's branch, Hz: by the analysis, and the peak of its angle's spectrum; no numbers where unknown."""
+    by = [] if not (film / "markers.json").exists() else [f"--markers={film / 'markers.json'}"]
+    notes = json.loads((capture / "capture.json").read_text())["config"]["markers"]
+    if notes["find"]:
+        by = ["--markers"]
+    done = subprocess.run([arborcam, "analyze", capture, *by, "--json"], capture_output=True, text=True)
+    if done.returncode:
+        print(done.stderr)
+        return np.nan, np.nan
+    study = json.loads(done.stdout)
+    branches = study["captures"][0]["branches"]
+    own = next((b for b in branches if b["branch"] == name), branches[0])
+    number = lambda x: np.nan if x is None else float(x)
+    return number((own["frequency_hz"] or {}).get("value")), number(own["spectrum_peak_hz"])
+
+
+if __name__ == "__main__":
+    main()

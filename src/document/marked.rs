@@ -1,0 +1,310 @@
+//! The tree of the coloured markers of a capture: each marker is the end of a branch that begins at its
+//! parent (Hu et al. sect. 5.3).
+
+use super::error::DocumentError;
+use super::nodes::NodesRead;
+use super::note::ModelNote;
+use super::tracks::{PointsRead, read_points};
+use super::{Document, TRACKS_FILE, outline, picture, size};
+use crate::bounds::Bounds;
+use crate::config::MarkerWindow;
+use crate::dynamics::Film;
+use crate::model::{
+    Foot, JointPose, Node, NodeId, NodeKind, NodeName, Pose, Skeleton, TrackId, Unidentified,
+};
+use crate::signal::statistics::median_vector;
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector3, distance};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Markers as a tree, and their film.
+#[derive(Clone, Debug)]
+pub struct MarkedTree {
+    /// The foot, then the markers, each after its parent. A node's name is the number of its marker, from
+    /// 1.
+    pub skeleton: Skeleton,
+    /// Names of the markers, by node name.
+    pub names: BTreeMap<NodeName, String>,
+    /// Each marker is the one point on its node.
+    pub film: Film,
+}
+
+/// A marker that was seen.
+struct Seen<'a> {
+    /// Its place among the capture's markers.
+    marker: usize,
+    given: &'a MarkerWindow,
+    /// The median of its places, px.
+    rest_px: Point2<f64>,
+}
+
+impl Document {
+    /// The document in `dir` for its markers: as [`tree`](Self::tree), but where no tree was built it is the
+    /// foot alone.
+    ///
+    /// # Errors
+    /// The folder is no document, or one of its tables is damaged.
+    pub fn for_markers(dir: &Path) -> Result<Self, DocumentError> {
+        match Self::tree(dir) {
+            Err(DocumentError::NoTree { .. }) => Self::foot_alone(dir),
+            read => read,
+        }
+    }
+
+    fn foot_alone(dir: &Path) -> Result<Self, DocumentError> {
+        let mut note = Self::note(dir)?;
+        let size = size(&note);
+        let corners_px = note.outline.as_ref().map(|noted| noted.polygon_px.clone());
+        let region = corners_px.and_then(|corners| outline(note.outline.as_ref()?, &corners).ok());
+        let lower_middle = Point2::new(0.5 * f64::from(size.width), f64::from(size.height));
+        let foot_px = region.map_or(lower_middle, |region| Foot::of(&region, None).position_px);
+        let skeleton = Skeleton {
+            nodes: vec![node(NodeName(0), None, 0, Point3::origin())],
+            foot_px,
+            image_size: size,
+        };
+        note.model = Some(ModelNote::of(&skeleton, note.config.export.metres_per_px));
+        let picture = note.picture.as_ref().map(|p| picture::bytes(dir, p));
+        let nodes = NodesRead {
+            sway: vec![Err(Unidentified::NotMeasured)],
+            skeleton,
+        };
+        Self::of_parts(dir, note, nodes, picture)
+    }
+
+    /// The tree of the markers in the last `window_s` seconds of what lies between two times, s. Who is
+    /// whose parent follows from `parents`, which are of the same names; without them from what the
+    /// capture was given; and where that says nothing, from the motion: a marker's parent is the next one
+    /// towards the foot on the branches of the tree of all points.
+    ///
+    /// # Errors
+    /// The capture has no markers, or none was seen, `parents` are of others, or `tracks.csv` is missing
+    /// or damaged.
+    pub fn marked_tree(
+        &self,
+        parents: Option<&[MarkerWindow]>,
+        window_s: f64,
+        within_s: Bounds,
+    ) -> Result<MarkedTree, DocumentError> {
+        let given = &self.note.config.markers.windows;
+        if !self.has_tracks() {
+            return Err(self.no_film(TRACKS_FILE));
+        }
+        let points = read_points(&self.dir, &self.skeleton, window_s, within_s)?;
+        let mut seen = Vec::with_capacity(given.len());
+        for (marker, given) in given.iter().enumerate() {
+            let places_px = points.places_px(TrackId::of_marker(marker));
+            if !places_px.is_empty() {
+                let rest_px = median_vector(places_px.iter().map(|p| p.coords)).into();
+                seen.push(Seen {
+                    marker,
+                    given,
+                    rest_px,
+                });
+            }
+        }
+        if seen.is_empty() {
+            return Err(DocumentError::NoMarkers {
+                dir: self.dir.clone(),
+            });
+        }
+        let parent_of = match parents {
+            Some(parents) => {
+                self.check_names(given, parents)?;
+                by_hand(&seen, parents)
+            }
+            None if given.iter().any(|m| m.parent.is_some()) => by_hand(&seen, given),
+            None => by_motion(&seen, &points, &self.skeleton),
+        };
+        Ok(self.marked(&seen, &parent_of, &points))
+    }
+
+    fn check_names(
+        &self,
+        given: &[MarkerWindow],
+        parents: &[MarkerWindow],
+    ) -> Result<(), DocumentError> {
+        let is_known = |marker: &&MarkerWindow| given.iter().any(|g| g.name == marker.name);
+        match parents.iter().find(|marker| !is_known(marker)) {
+            None => Ok(()),
+            Some(marker) => Err(DocumentError::UnknownMarker {
+                dir: self.dir.clone(),
+                name: marker.name.clone(),
+            }),
+        }
+    }
+
+    /// The tree of markers whose parents are known, by index into `seen`.
+    fn marked(
+        &self,
+        seen: &[Seen],
+        parent_of: &[Option<usize>],
+        points: &PointsRead,
+    ) -> MarkedTree {
+        let foot_px = self.skeleton.foot_px;
+        let mut nodes = vec![node(NodeName(0), None, 0, Point3::origin())];
+        let mut node_of: BTreeMap<usize, NodeId> = BTreeMap::new();
+        let mut names = BTreeMap::new();
+        for k in parents_first(parent_of) {
+            let parent = parent_of[k].and_then(|p| node_of.get(&p).copied());
+            let parent = parent.unwrap_or_default();
+            let at = seen[k].rest_px - foot_px;
+            let name = NodeName(seen[k].marker as u32 + 1);
+            let level = nodes[parent.index()].level.saturating_add(1);
+            node_of.insert(k, NodeId(nodes.len() as u32));
+            nodes.push(node(
+                name,
+                Some(parent),
+                level,
+                Point3::new(at.x, -at.y, 0.0),
+            ));
+            names.insert(name, seen[k].given.name.clone());
+        }
+        // Parents stand before their children.
+        for i in (1..nodes.len()).rev() {
+            if let Some(parent) = nodes[i].parent {
+                nodes[parent.index()].n_tracks += nodes[i].n_tracks;
+            }
+        }
+        let skeleton = Skeleton {
+            nodes,
+            foot_px,
+            image_size: self.skeleton.image_size,
+        };
+        let node_of_marker: BTreeMap<TrackId, NodeId> = node_of
+            .iter()
+            .map(|(k, node)| (TrackId::of_marker(seen[*k].marker), *node))
+            .collect();
+        let film = points.film_on(&skeleton, |id| node_of_marker.get(&id).copied());
+        MarkedTree {
+            skeleton,
+            names,
+            film,
+        }
+    }
+}
+
+impl MarkedTree {
+    /// The poses of the tree in the frames of a part of its film, of which `skeleton` is where it rests: each
+    /// node is where its marker is, and nowhere while that is not seen.
+    pub fn poses(&self, film: &Film, skeleton: &Skeleton) -> Vec<Pose> {
+        let n = skeleton.nodes.len();
+        let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
+        let mut poses = Vec::with_capacity(film.times_s.len());
+        for (k, time_s) in film.times_s.iter().enumerate() {
+            let mut places = vec![nowhere; n];
+            places[0] = Point3::origin();
+            for track in &film.tracks {
+                let off = track.at_px[k] - skeleton.foot_px;
+                places[track.node.index()] = Point3::new(off.x, -off.y, 0.0);
+            }
+            poses.push(Pose {
+                frame: k as u64,
+                time_s: *time_s,
+                joints: (0..n).map(|i| joint(i, &places, skeleton)).collect(),
+            });
+        }
+        poses
+    }
+}
+
+/// Where a node is, and how its branch has turned in the picture.
+fn joint(i: usize, places: &[Point3<f64>], skeleton: &Skeleton) -> JointPose {
+    let nodes = &skeleton.nodes;
+    let mut joint = JointPose::at_rest(places[i]);
+    if let Some(parent) = nodes[i].parent.map(NodeId::index) {
+        let rest = nodes[i].position - nodes[parent].position;
+        let now = places[i] - places[parent];
+        let angle = rest.xy().perp(&now.xy()).atan2(rest.xy().dot(&now.xy()));
+        if angle.is_finite() {
+            joint.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        }
+    }
+    joint
+}
+
+fn node(name: NodeName, parent: Option<NodeId>, level: u8, position: Point3<f64>) -> Node {
+    Node {
+        name,
+        parent,
+        level,
+        position,
+        radius: 1.0,
+        n_tracks: u32::from(parent.is_some()),
+        kind: NodeKind::Measured,
+        certainty: 1.0,
+        copy_of: None,
+        plane_angle: 0.0,
+        moves_with: None,
+    }
+}
+
+/// The parents that the user gives, by index into `seen`. The nearest one that was seen counts.
+fn by_hand(seen: &[Seen], parents: &[MarkerWindow]) -> Vec<Option<usize>> {
+    let mut parent_of = Vec::with_capacity(seen.len());
+    for own in seen {
+        let mut name = Some(&own.given.name);
+        let mut found = None;
+        for _ in 0..parents.len() {
+            let entry = name.and_then(|name| parents.iter().find(|p| p.name == *name));
+            name = entry.and_then(|entry| entry.parent.as_ref());
+            found = name.and_then(|name| seen.iter().position(|s| s.given.name == *name));
+            if found.is_some() {
+                break;
+            }
+        }
+        parent_of.push(found);
+    }
+    parent_of
+}
+
+/// The parents that follow from the branches on which the motion puts the markers.
+fn by_motion(seen: &[Seen], points: &PointsRead, skeleton: &Skeleton) -> Vec<Option<usize>> {
+    let mut along = Vec::with_capacity(seen.len());
+    for own in seen {
+        let node = points.node(TrackId::of_marker(own.marker));
+        along.push(node.map(|node| (node, along_px(own.rest_px, node, skeleton))));
+    }
+    let mut parent_of = Vec::with_capacity(seen.len());
+    for k in 0..seen.len() {
+        parent_of.push(along[k].and_then(|(node, from_base_px)| {
+            let on_own = last_on(&along, node, from_base_px);
+            on_own.or_else(|| {
+                let mut below = skeleton.ancestors(node);
+                below.find_map(|node| last_on(&along, node, f64::INFINITY))
+            })
+        }));
+    }
+    parent_of
+}
+
+/// How far from the base of its branch a marker is, px.
+fn along_px(rest_px: Point2<f64>, node: NodeId, skeleton: &Skeleton) -> f64 {
+    let parent = skeleton.nodes[node.index()].parent.unwrap_or(node);
+    let base = skeleton.nodes[parent.index()].position;
+    distance(&skeleton.image_from_model(&base), &rest_px)
+}
+
+/// The marker on a node that is farthest from its base, but nearer than this, px.
+fn last_on(along: &[Option<(NodeId, f64)>], node: NodeId, before_px: f64) -> Option<usize> {
+    let placed = along.iter().enumerate();
+    let on_node = placed.filter_map(|(k, place)| Some((k, (*place)?)));
+    on_node
+        .filter(|(_, (on, px))| *on == node && *px < before_px)
+        .max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
+        .map(|(k, _)| k)
+}
+
+/// All indices, each after its parent; of a ring, which no reader lets pass, the rest is left out.
+fn parents_first(parent_of: &[Option<usize>]) -> Vec<usize> {
+    let mut order: Vec<usize> = Vec::with_capacity(parent_of.len());
+    for _ in 0..parent_of.len() {
+        for (k, parent) in parent_of.iter().enumerate() {
+            let is_next = !order.contains(&k) && parent.is_none_or(|p| order.contains(&p));
+            if is_next {
+                order.push(k);
+            }
+        }
+    }
+    order
+}

@@ -1,0 +1,109 @@
+//! Rectangles of whole pixels.
+
+use crate::model::Size;
+use nalgebra::{Point2, Vector2};
+
+/// A rectangle of whole pixels; it may reach off the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelArea {
+    /// Its left and upper edge.
+    pub u: i32,
+    pub v: i32,
+    pub width: i32,
+    pub height: i32,
+}
+
+impl PixelArea {
+    /// The area of about this size around a place, px.
+    pub fn around(middle_px: Point2<f64>, size_px: Vector2<f64>) -> Self {
+        let size = size_px.map(|side| side.round().max(1.0));
+        let corner = middle_px.coords + Vector2::repeat(0.5) - 0.5 * size;
+        Self {
+            u: corner.x.round() as i32,
+            v: corner.y.round() as i32,
+            width: size.x as i32,
+            height: size.y as i32,
+        }
+    }
+
+    /// Its middle, px: the centre of pixel (0, 0) is (0, 0).
+    pub fn middle_px(&self) -> Point2<f64> {
+        let size = Vector2::new(f64::from(self.width), f64::from(self.height));
+        let corner = Point2::new(f64::from(self.u), f64::from(self.v));
+        corner + 0.5 * size - Vector2::repeat(0.5)
+    }
+
+    /// Width and height, px.
+    pub fn size_px(&self) -> Vector2<f64> {
+        Vector2::new(f64::from(self.width), f64::from(self.height))
+    }
+
+    /// The part that lies in a picture of this size; `None` where there is none.
+    pub fn within(&self, size: Size) -> Option<Self> {
+        let (width, height) = (size.width as i32, size.height as i32);
+        let (u, v) = (self.u.max(0), self.v.max(0));
+        let right = self.u.saturating_add(self.width).min(width);
+        let bottom = self.v.saturating_add(self.height).min(height);
+        (u < right && v < bottom).then(|| Self {
+            u,
+            v,
+            width: right - u,
+            height: bottom - v,
+        })
+    }
+
+    /// The same in an area whose corner is that of `outer`.
+    pub fn relative_to(&self, outer: &Self) -> Self {
+        Self {
+            u: self.u - outer.u,
+            v: self.v - outer.v,
+            ..*self
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_area_lies_around_its_middle_and_is_cut_at_the_edge() {
+        let area = PixelArea::around(Point2::new(10.0, 4.0), Vector2::new(5.0, 3.0));
+        assert_eq!(
+            area,
+            PixelArea {
+                u: 8,
+                v: 3,
+                width: 5,
+                height: 3
+            }
+        );
+        assert_eq!(area.middle_px(), Point2::new(10.0, 4.0));
+        let cut = PixelArea {
+            u: -2,
+            v: 3,
+            width: 5,
+            height: 30,
+        }
+        .within(Size::new(8, 9));
+        assert_eq!(
+            cut,
+            Some(PixelArea {
+                u: 0,
+                v: 3,
+                width: 3,
+                height: 6
+            })
+        );
+        assert_eq!(
+            PixelArea {
+                u: 8,
+                v: 0,
+                width: 5,
+                height: 5
+            }
+            .within(Size::new(8, 9)),
+            None
+        );
+    }
+}

@@ -1,0 +1,105 @@
+//! Coloured markers beside the points: frame to tracks of markers.
+
+use crate::config::{MarkerWindow, Markers};
+use crate::markers::{MarkerError, MarkerEvent, MarkerPlace, MarkerTracker};
+use crate::model::{Background, Frame, Observation, Outline, TrackSet};
+use nalgebra::Point2;
+
+/// Side of the window around a marker that is picked, px at 640 px.
+const PICKED_SIDE_PX: f64 = 16.0;
+
+/// Follows markers, where there are any, from the first frame in colour on.
+pub(super) struct MarkerStage {
+    settings: Markers,
+    tracker: Option<MarkerTracker>,
+    /// Picked in the picture, px; they are taken in the next frame.
+    picked_px: Vec<Point2<f64>>,
+    error: Option<MarkerError>,
+    /// There are others than before.
+    are_new: bool,
+}
+
+impl MarkerStage {
+    pub fn new(settings: &Markers) -> Self {
+        Self {
+            settings: settings.clone(),
+            tracker: None,
+            picked_px: Vec::new(),
+            error: None,
+            are_new: false,
+        }
+    }
+
+    /// Follows the markers into a frame, whose colours are not needed any more then. Markers that are
+    /// looked for lie in `region`, if there is one.
+    pub fn step(&mut self, frame: &mut Frame, region: Option<&Outline>) -> Vec<MarkerPlace> {
+        let Some(picture) = frame.colour.take() else {
+            return Vec::new();
+        };
+        if self.tracker.is_none() && self.error.is_none() {
+            let tracker = MarkerTracker::begin(&picture, frame.time_s, region, &self.settings);
+            match tracker {
+                Ok(tracker) => self.tracker = Some(tracker),
+                Err(e) => self.error = Some(e),
+            }
+            self.are_new = true;
+        }
+        let Some(tracker) = &mut self.tracker else {
+            return Vec::new();
+        };
+        let side_px = PICKED_SIDE_PX * f64::from(picture.size.width) / 640.0;
+        for at_px in self.picked_px.drain(..) {
+            tracker.pick(&picture, frame.time_s, at_px, side_px);
+            self.are_new = true;
+        }
+        tracker.step(frame.index, frame.time_s, &picture)
+    }
+
+    /// Adds the markers of a frame to its tracks, without the camera's motion.
+    pub fn join(markers: &[MarkerPlace], tracks: &mut TrackSet) {
+        if tracks.camera.background == Background::Lost {
+            return;
+        }
+        // They are never rejected, and count from when points do: those on trial would not count beside
+        // them.
+        let points = &tracks.observations;
+        let confirmed = points.is_empty() || points.iter().any(|o| o.confirmed);
+        for marker in markers {
+            let steady_px = tracks.camera.steady_px(marker.at_px).cast::<f32>();
+            tracks.observations.push(Observation {
+                id: marker.id,
+                u_px: steady_px.x,
+                v_px: steady_px.y,
+                fb_error_px: 0.0,
+                error_px: None,
+                confirmed,
+            });
+        }
+    }
+
+    pub fn pick(&mut self, places_px: Vec<Point2<f64>>) {
+        self.picked_px.extend(places_px);
+    }
+
+    pub fn finish(&mut self) {
+        if let Some(tracker) = &mut self.tracker {
+            tracker.finish();
+        }
+    }
+
+    pub fn take_events(&mut self) -> Vec<MarkerEvent> {
+        self.tracker
+            .as_mut()
+            .map_or(Vec::new(), MarkerTracker::take_events)
+    }
+
+    pub fn take_error(&mut self) -> Option<MarkerError> {
+        self.error.take()
+    }
+
+    pub fn take_new(&mut self) -> Option<Vec<MarkerWindow>> {
+        let is_new = std::mem::take(&mut self.are_new);
+        let tracker = self.tracker.as_ref().filter(|_| is_new)?;
+        Some(tracker.windows())
+    }
+}

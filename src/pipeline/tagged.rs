@@ -1,0 +1,99 @@
+//! A printed tag beside the trunk: frames to a scale.
+
+use crate::config::Tag;
+use crate::model::{Frame, TagScale};
+use crate::tag::{TagSeen, find_tags, scale_of};
+
+/// The scale is fixed after so many sights, in one of so many frames; from then on the tag is looked at in
+/// one of more frames, which tells whether the camera moves.
+const SIGHTS: usize = 10;
+const EVERY: u64 = 3;
+const EVERY_THEN: u64 = 30;
+/// Sights that are kept: memory does not grow with the film.
+const MAX_SIGHTS: usize = 1000;
+/// After so many frames without a sight the user should know.
+const FRAMES_WITHOUT: u64 = 90;
+
+/// What has become of the tag.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TagNews {
+    /// The scale is known.
+    Scale(TagScale),
+    /// The same with later sights, of which the scale does not take notice.
+    Seen(TagScale),
+    /// There is none in the first frames.
+    NoneSeen,
+}
+
+/// Looks for the tag, where there is one.
+pub(super) struct TagStage {
+    settings: Tag,
+    sights: Vec<TagSeen>,
+    frames: u64,
+    scale: Option<TagScale>,
+    news: Vec<TagNews>,
+}
+
+impl TagStage {
+    pub fn new(settings: &Tag) -> Self {
+        Self {
+            settings: settings.clone(),
+            sights: Vec::new(),
+            frames: 0,
+            scale: None,
+            news: Vec::new(),
+        }
+    }
+
+    /// Looks for it in the next frame, if it is that one's turn.
+    pub fn step(&mut self, frame: &Frame) {
+        let every = if self.scale.is_some() {
+            EVERY_THEN
+        } else {
+            EVERY
+        };
+        let is_turn = self.frames.is_multiple_of(every);
+        self.frames += 1;
+        if self.settings.size_m <= 0.0 {
+            return;
+        }
+        if is_turn && self.sights.len() < MAX_SIGHTS {
+            let known = self.sights.first().map(|seen| seen.tag.id);
+            let tags = find_tags(&frame.luma);
+            let tag = tags.iter().find(|tag| known.is_none_or(|id| id == tag.id));
+            self.sights.extend(tag.and_then(TagSeen::of));
+        }
+        if self.scale.is_none() && self.sights.len() >= SIGHTS {
+            self.fix();
+        }
+        if self.frames == FRAMES_WITHOUT && self.sights.is_empty() {
+            self.news.push(TagNews::NoneSeen);
+        }
+    }
+
+    /// There are no more frames.
+    pub fn finish(&mut self) {
+        match self.scale {
+            None => self.fix(),
+            Some(fixed) => {
+                let all = scale_of(&self.sights, self.settings.size_m);
+                self.news.extend(all.map(|all| {
+                    TagNews::Seen(TagScale {
+                        frames: all.frames,
+                        moves_px: all.moves_px,
+                        ..fixed
+                    })
+                }));
+            }
+        }
+    }
+
+    fn fix(&mut self) {
+        self.scale = scale_of(&self.sights, self.settings.size_m);
+        self.news.extend(self.scale.map(TagNews::Scale));
+    }
+
+    pub fn take_news(&mut self) -> Vec<TagNews> {
+        std::mem::take(&mut self.news)
+    }
+}
