@@ -21,6 +21,7 @@ mod grown;
 mod leaves;
 #[cfg(feature = "opencv")]
 mod marked;
+#[cfg(feature = "opencv")]
 mod photograph;
 mod pose_tracker;
 mod refiner;

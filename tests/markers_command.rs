@@ -173,6 +173,9 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
         let peak = branch["spectrum_peak_hz"].as_f64().expect("a peak");
         assert!((peak - hz).abs() < 0.05, "{peak} for {hz}");
     }
+    let output = scene.run("analyze out --markers");
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert_eq!(table.matches("; peak ").count(), 2, "{table}");
     // By a file that says that both stand on the foot.
     let [a, b] = markers_px(0);
     scene.markers(&format!("{}, {}", window("A", a, ""), window("B", b, "")));

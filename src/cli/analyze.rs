@@ -342,6 +342,7 @@ fn marked_tree(
 
 /// Calls the branches as the markers are called in which they end.
 fn name_by_markers(study: &mut Study, marked: &MarkedTree) {
+    study.by_markers = true;
     for branch in &mut study.branches {
         if let Some(name) = marked.names.get(&NodeName(branch.name)) {
             branch.piece.clone_from(name);

@@ -81,6 +81,9 @@ pub struct Study {
     pub outline_px: Vec<Point2<i32>>,
     pub picture: Option<String>,
     pub branches: Vec<Branch>,
+    /// The branches are those between coloured markers, which seldom have enough points for a frequency
+    /// with an interval: their peaks are all that there is.
+    pub by_markers: bool,
     /// The modes of the whole tree, the slowest first.
     pub modes: Vec<ModeSummary>,
     pub notes: Vec<String>,
@@ -197,6 +200,7 @@ impl Study {
             outline_px: given.outline_px.to_vec(),
             picture: given.picture.map(str::to_owned),
             branches: Vec::new(),
+            by_markers: false,
             modes: ModeSummary::all(&analysis.modes, skeleton),
             notes: given.notes.to_vec(),
         };

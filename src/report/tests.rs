@@ -59,6 +59,7 @@ pub fn study(tips: &[Point2<f64>]) -> Study {
         foot_px: Point2::new(320.0, 340.0),
         outline_px: Vec::new(),
         picture: None,
+        by_markers: false,
         branches: branches.collect(),
         modes: Vec::new(),
         notes: Vec::new(),

@@ -9,6 +9,7 @@ use super::pattern::{LevelPeaks, Pattern, pattern};
 use super::study::{Branch, Study};
 use super::values::{interval, number, percent, spread};
 use super::words;
+use crate::dynamics::HalfPower;
 use crate::model::ModeSummary;
 pub use compared::{heading, lost, unmatched};
 
@@ -95,6 +96,15 @@ fn left_out(heads: &[String]) -> String {
     }
 }
 
+/// The largest peak and its half-power damping, for a branch that has nothing else.
+fn peak_words(peak: HalfPower) -> String {
+    format!(
+        "; peak {} Hz, eq. 6 {}",
+        number(peak.peak_hz, 2),
+        number(peak.damping_ratio, 3)
+    )
+}
+
 fn row(study: &Study, branch: &Branch) -> Vec<String> {
     let parent = branch.parent.map_or("foot".into(), |p| p.to_string());
     let mut row = vec![
@@ -104,7 +114,14 @@ fn row(study: &Study, branch: &Branch) -> Vec<String> {
         branch.points.to_string(),
     ];
     match branch.sway {
-        Err(_) => row.push(format!("  none: {}", branch.why().unwrap_or_default())),
+        Err(_) => {
+            let why = branch.why().unwrap_or_default();
+            let peak = branch.reference.filter(|_| study.by_markers);
+            row.push(format!(
+                "  none: {why}{}",
+                peak.map_or(String::new(), peak_words)
+            ));
+        }
         Ok(sway) => {
             row.push(interval(&sway.frequency_hz, 3));
             row.push(
