@@ -326,6 +326,10 @@ fn a_frame_of_a_film_is_a_photograph() {
     assert_eq!(output.status.code(), Some(BAD_USAGE));
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("frames, counted from 0"), "{said}");
+    let first = format!("{} --branch {}", film.display(), trunk.display());
+    let output = scene.photo(&first, "first");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!said.contains("no picture"), "{said}");
 }
 
 impl Scene {

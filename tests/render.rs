@@ -260,7 +260,7 @@ fn bad_input_gets_one_line() {
     );
     let good = capture();
     let cases: &[(&[&str], i32, &str)] = &[
-        (&[&at("absent"), "--out", &new], 3, "no capture"),
+        (&[&at("absent"), "--out", &new], 3, "is not there"),
         (&[&at("empty"), "--out", &new], 3, "no capture"),
         (&[&at("spoilt"), "--out", &new], 3, "motion.csv"),
         (

@@ -575,7 +575,8 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/analyze.md",
     "usr/share/doc/arborcam/dynamics.md",
     "usr/share/doc/arborcam/gallery.md",
-    "usr/share/doc/arborcam/grow.md",
+    "usr/share/doc/arborcam/markers.md",
+    "usr/share/doc/arborcam/clouds.md",
     "usr/share/doc/arborcam/sketch.md",
 ];
 

@@ -175,7 +175,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         };
         let new = PhotoTree::new(parts, growth, config.clone());
         let mut new = new.map_err(|e| failure(&shown, own, e))?;
-        new.tree.note.warnings.extend(found_note(tree));
+        new.tree.note.warnings.extend(found_note(tree, own));
         trees.push(new);
     }
     let forest = match trees.len() {
@@ -238,7 +238,7 @@ fn seen(
             &CancelToken::new(),
         );
         let tree = tree.map_err(|e| failure(shown, own, e.into()))?;
-        if let Some(note) = found_note(&tree) {
+        if let Some(note) = found_note(&tree, own) {
             eprint_line(&format!("arborcam: note: {note}"));
         }
         seen.push(tree);
@@ -246,12 +246,17 @@ fn seen(
     Ok(seen)
 }
 
-/// What is said of a tree that was found without strokes, and how sure that is.
-fn found_note(tree: &TreeInPhoto) -> Option<String> {
+/// What is said of what was found without a stroke, and how sure that is.
+fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
     let agreement = 100.0 * tree.agreement?;
+    let strokes = &drawn.strokes;
+    let (what, missing) = match (strokes.crown_px.is_empty(), strokes.branches_px.is_empty()) {
+        (true, true) => ("the tree was found without strokes", "--crown and --branch"),
+        (true, false) => ("the crown was found without a stroke", "--crown"),
+        (false, _) => ("the trunk was found without a stroke", "--branch"),
+    };
     Some(format!(
-        "the tree was found without strokes: two attempts agree by {agreement:.0} %; if it is wrong, draw --crown \
-         and --branch"
+        "{what}: two attempts agree by {agreement:.0} %; if it is wrong, draw with {missing}, or on the screen with --draw"
     ))
 }
 
@@ -263,6 +268,9 @@ fn failure(shown: &ShownPicture, drawn: &DrawnTree, e: PhotoTreeError) -> Comman
             CommandError::BadUsage(anyhow!("{place}: {e}"))
         }
         PhotoTreeError::Photo(PhotoError::Cancelled) => CommandError::Stopped,
+        PhotoTreeError::Photo(e) if e.is_of_picture() => CommandError::Failed(anyhow!(
+            "{place}: {e} (--draw, or --crown and --branch; --tree for each of several trees)"
+        )),
         PhotoTreeError::Photo(e) => CommandError::Failed(anyhow!("{place}: {e}")),
         PhotoTreeError::Prepare(e) => e.into(),
     }

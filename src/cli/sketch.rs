@@ -43,6 +43,7 @@ pub fn run(args: &SketchArgs) -> Result<(), CommandError> {
     }
     tree.write(&args.out)?;
     let shown = args.out.display();
-    eprint_line(&format!("{shown}: a tree of {branches} branches"));
+    let noun = if branches == 1 { "branch" } else { "branches" };
+    eprint_line(&format!("{shown}: a tree of {branches} {noun}"));
     Ok(())
 }

@@ -5,6 +5,7 @@ mod bounded;
 mod error;
 mod file;
 mod folder;
+mod name;
 mod place;
 mod replace;
 
@@ -12,5 +13,6 @@ pub use bounded::read_bounded;
 pub use error::WriteError;
 pub use file::{OutputFile, write_files};
 pub use folder::OutputFolder;
+pub use name::is_named_film;
 pub use place::refuse_taken;
 pub use replace::replace;

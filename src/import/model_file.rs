@@ -4,6 +4,7 @@ use super::error::ImportError;
 use super::gltf_skeleton::{self, MovingModel};
 use super::model_tree::ModelTree;
 use super::{cylinders, obj, ply, treefile};
+use crate::files::is_named_film;
 use std::path::Path;
 
 /// Reads a modelled tree in the `bytes` of the file at `path`, whose name says its format: `.glb` and
@@ -23,7 +24,7 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
         "ply" => ply::edges(bytes)?,
         "csv" => cylinders::edges(bytes)?,
         "txt" => treefile::edges(&String::from_utf8_lossy(bytes))?,
-        "mkv" | "avi" | "mp4" | "mcap" => {
+        _ if is_named_film(path) => {
             return Err(ImportError::unsupported(
                 "it is a film",
                 "make a tree of it with `arborcam replay`, and give that",

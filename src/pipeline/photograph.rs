@@ -69,6 +69,11 @@ pub enum PhotoError {
 }
 
 impl PhotoError {
+    /// Whether the tree was not found, or not whole: strokes help.
+    pub fn is_of_picture(&self) -> bool {
+        matches!(self, Self::NoTree | Self::NoWood | Self::NoRegion(_))
+    }
+
     /// Whether what was drawn is at fault, and not the photograph.
     pub fn is_of_strokes(&self) -> bool {
         matches!(

@@ -2,7 +2,7 @@
 
 use crate::cli::command_error::CommandError;
 use crate::config;
-use crate::files::read_bounded;
+use crate::files::{is_named_film, read_bounded};
 use crate::model::{Picture, Size};
 use crate::runtime::{self, FrameError, one_frame};
 use crate::source::Photograph;
@@ -45,15 +45,14 @@ impl ShownPicture {
 }
 
 impl PictureArgs {
-    /// Reads the picture. What is no file, a recording, and all of which a frame is named is a film.
+    /// Reads the picture. What is no file, has the name of a film, and all of which a frame is named is a
+    /// film.
     ///
     /// # Errors
     /// There is none, or it is damaged, too large or too small, or the film has no such frame.
     pub fn read(&self, camera: &config::Camera) -> Result<ShownPicture, CommandError> {
-        let ending = self.picture.extension();
-        let is_recording = ending.is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
         let is_there = self.picture.exists();
-        let is_film = is_there && (!self.picture.is_file() || is_recording);
+        let is_film = is_there && (!self.picture.is_file() || is_named_film(&self.picture));
         match is_film || self.frame.is_some() {
             true => self.read_frame(camera),
             false => self.read_file(),
