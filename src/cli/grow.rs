@@ -109,7 +109,7 @@ pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
     let parent = Parent::new(document, options)?;
     if parent.loses_axis() {
         eprint_line(
-            "warning: the example has one trunk up to the top; new trees of its forks do not keep it, \
+            "arborcam: warning: the example has one trunk up to the top; new trees of its forks do not keep it, \
              --like von-mises does",
         );
     }

@@ -256,7 +256,8 @@ fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
         (false, _) => ("the trunk was found without a stroke", "--branch"),
     };
     Some(format!(
-        "{what}: two attempts agree by {agreement:.0} %; if it is wrong, draw with {missing}, or on the screen with --draw"
+        "{what}: two attempts agree by {agreement:.0} %; if it is wrong, draw with {missing}, or on the \
+         screen with --draw"
     ))
 }
 

@@ -158,23 +158,27 @@ fn slowest(decaying: &DecayingMotions, signals: &Signals, fit: &Fit) -> Asked {
         // A decay lasts as long as its damping is small.
         energies[m] = squares / (mode.damping * mode.frequency_hz);
     }
-    let of = |wanted: fn(&Signals, &Mode) -> bool| {
-        let modes = fit.modes.iter().enumerate();
-        modes
-            .filter(move |(_, mode)| wanted(signals, mode))
-            .map(|(m, _)| m)
-    };
-    let largest = of(may_be_sway).map(|m| energies[m]).fold(0.0, f64::max);
-    let large = of(may_be_sway).filter(|m| energies[*m] >= MIN_ENERGY * largest);
-    let slowest = large.min_by(|a, b| {
+    let seen = modes_that(may_be_sway, signals, fit);
+    let largest = seen.iter().map(|m| energies[*m]).fold(0.0, f64::max);
+    let mut large = seen;
+    large.retain(|m| energies[*m] >= MIN_ENERGY * largest);
+    let slowest = large.into_iter().min_by(|a, b| {
         let [a, b] = [a, b].map(|m| fit.modes[*m].frequency_hz);
         a.total_cmp(&b)
     });
     let size = slowest.map_or(0.0, |m| sizes[m]);
+    let brief = modes_that(is_too_brief, signals, fit);
     Asked {
-        is_too_short: of(is_too_brief).any(|m| sizes[m] > size),
+        is_too_short: brief.iter().any(|m| sizes[*m] > size),
         sway: slowest.and_then(|m| sway_of(signals, fit, &factors, m)),
     }
+}
+
+/// The places of those modes of a fit that are `wanted`.
+fn modes_that(wanted: fn(&Signals, &Mode) -> bool, signals: &Signals, fit: &Fit) -> Vec<usize> {
+    let mut places: Vec<usize> = (0..fit.modes.len()).collect();
+    places.retain(|m| wanted(signals, &fit.modes[*m]));
+    places
 }
 
 /// Mode `m` of a fit with its deviations.

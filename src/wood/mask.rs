@@ -50,7 +50,7 @@ const MOVING_ODDS: f32 = 8.0;
 const STILL_ODDS: f32 = 50.0;
 const MOST_STILL_ODDS: f32 = 8.0;
 /// No colour counts more than this: mixtures are sure of what they have not seen.
-const COLOUR_ODDS: f32 = 4.0;
+pub(super) const COLOUR_ODDS: f32 = 4.0;
 /// Odds of wood on a ridge, elsewhere, and where ridges are not looked for: most pixels are none.
 const RIDGE_ODDS: f32 = 0.0;
 const PLAIN_ODDS: f32 = -4.0;

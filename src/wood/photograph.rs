@@ -8,7 +8,7 @@
 
 use super::cut::{SURE, least_cut};
 use super::foliage::{LeafColour, foliage, pixel, sampled};
-use super::mask::{self, Part, Parts, WoodMask};
+use super::mask::{self, COLOUR_ODDS, Part, Parts, WoodMask};
 use super::mixture::Mixture;
 use super::{Stroke, bark, circles, faint, paths, probability, widened};
 use crate::cancel::CancelToken;
@@ -34,8 +34,6 @@ const LEAST_BARK: usize = 64;
 /// The colours on the strokes are bark if their odds against all else are this at least in their mean, as
 /// a logarithm; elsewhere there is nothing to see.
 const LEAST_TOLD: f64 = 0.5;
-/// No colour counts more than this: mixtures are sure of what they have not seen.
-const COLOUR_ODDS: f32 = 4.0;
 /// What is added to the odds of a bare tree's pixel on a ridge, and elsewhere; to those of a tree
 /// in leaf; and of its leaves. By the truth of ten made photographs.
 const RIDGE_ODDS: f32 = 1.6;

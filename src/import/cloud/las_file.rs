@@ -10,13 +10,13 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 const MOST_POINTS_OF_BYTE: u64 = 64;
 /// Points that are read at a time.
 const PIECE: u64 = 65_536;
-/// Where the header of LAS 1.4 tells of its first extended record, how long the head of such a
-/// record is, and where in it its length is.
+/// Where the header of LAS 1.4 has the place of its first extended record, how long the head of such
+/// a record is, and where in it its length is.
 const EVLR_AT: usize = 235;
 const HEADER_1_4: usize = 375;
 const EVLR_HEAD: u64 = 60;
 const EVLR_LENGTH_AT: u64 = 20;
-/// Records that tell of the coordinate system, and the keys and values of units in them (GeoTIFF
+/// Records on the coordinate system, and the keys and values of units in them (GeoTIFF
 /// 1.0 sect. 6.3.1.3).
 const GEO_KEYS: u16 = 34735;
 const WKT: u16 = 2112;
