@@ -37,7 +37,7 @@ mod supervisor;
 mod tree;
 mod unused;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
 use output::eprint_line;
 use std::process::ExitCode;
@@ -90,7 +90,7 @@ enum Command {
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
-    let cli = match Cli::try_parse() {
+    let cli = match parsed() {
         Ok(cli) => cli,
         Err(e) => return print_parse_error(&e),
     };
@@ -98,6 +98,13 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => status(&e),
     }
+}
+
+/// The arguments. A negative number is the value of the option before it, so that the message names
+/// the option and what it takes.
+fn parsed() -> Result<Cli, clap::Error> {
+    let command = Cli::command().mut_subcommands(|command| command.allow_negative_numbers(true));
+    Cli::from_arg_matches(&command.try_get_matches()?)
 }
 
 fn run(command: &Command) -> Result<(), CommandError> {

@@ -39,10 +39,10 @@ pub struct AnalyzeArgs {
     excitation: Option<ExcitationArg>,
     /// Begin of the analysed part of the film, s. Without --from and --to its end is analysed, of
     /// the length `dynamics.window_s`.
-    #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = moment)]
     pub from: Option<f64>,
     /// End of the analysed part of the film, s.
-    #[arg(long, value_name = "SECONDS", value_parser = moment, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = moment)]
     pub to: Option<f64>,
     /// Whether several captures are of the same tree. `auto` decides by the number of branches in
     /// the same place, and compares nothing if that is ambiguous.

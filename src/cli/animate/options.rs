@@ -31,18 +31,18 @@ pub struct AnimateArgs {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     /// Strength of the wind on the Beaufort scale, 0 (still) to 12.
-    #[arg(long, value_name = "FORCE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "FORCE")]
     pub wind: Option<f64>,
     /// Direction that the wind blows to or --pull pulls to, degrees about the trunk: 0 to the right
     /// of the picture, 90 away from the camera.
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DEGREES")]
     pub direction: Option<f64>,
     /// Variation of the wind speed relative to its mean, 0 (steady) to 1.
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SHARE")]
     pub gusts: Option<f64>,
     /// Exponent of the gust spectrum, 0 (rough) to 4 (smooth): power is proportional to frequency
     /// to the minus beta.
-    #[arg(long, value_name = "BETA", allow_negative_numbers = true)]
+    #[arg(long, value_name = "BETA")]
     pub beta: Option<f64>,
     /// Make the animation a seamless loop.
     #[arg(long = "loop")]

@@ -28,8 +28,7 @@ pub struct RenderArgs {
         long,
         value_name = "DEGREES",
         default_value_t = 0.0,
-        value_parser = degrees,
-        allow_negative_numbers = true
+        value_parser = degrees
     )]
     pub turn: f64,
     /// The picture (.png) or the video (.mp4); it must not exist.
