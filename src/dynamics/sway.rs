@@ -10,7 +10,7 @@ use super::modal;
 use super::point_modes::{PointModes, Shoot, is_open, may_have_other};
 use super::release::{FoundOnset, Onset, onset};
 use super::tree_modes;
-use super::whole_tree::modes_of_tree;
+use super::whole_tree::{modes_of_tree, withdraw_small};
 use super::wind;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
@@ -82,7 +82,13 @@ pub fn analyse(
             None => {}
         }
     }
-    let UsableFilm { film, members, .. } = &usable;
+    let UsableFilm {
+        film,
+        members,
+        trunk,
+        ..
+    } = &usable;
+    withdraw_small(&tree, film, members, *trunk, &mut sways, found.as_ref());
     Analysis {
         modes: modes_of_tree(&tree, film, members, &sways, found.as_ref()),
         sway: tree.by_node(&sways),

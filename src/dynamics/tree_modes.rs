@@ -24,6 +24,9 @@ use std::f64::consts::SQRT_2;
 /// damped as a tree may be, and so much of its motion is one turn of so many points.
 const MAX_LN_FREQUENCY_SD: f64 = 0.03;
 const DAMPING: Bounds = Bounds::new(0.005, 0.12);
+/// No branch swings so far, rad. Two modes that are near in frequency may both come out far too
+/// large, as they almost cancel.
+const LARGEST_ANGLE: f64 = 1.0;
 const MIN_SHARE: f64 = 0.8;
 const MIN_POINTS: usize = 4;
 /// It votes for a branch that has so much of its points, if it turns so much of that branch's, and if
@@ -103,6 +106,7 @@ fn counts(mode: &LocalMode) -> bool {
     !mode.at_limit
         && mode.ln_sd.frequency < MAX_LN_FREQUENCY_SD
         && DAMPING.contains(mode.mode.damping)
+        && SQRT_2 * mode.angle < LARGEST_ANGLE
         && mode.share > MIN_SHARE
         && mode.turned.len() >= MIN_POINTS
 }

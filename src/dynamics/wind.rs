@@ -42,7 +42,7 @@ const MAX_CARRIED_MOTIONS: usize = 4;
 const MIN_VARIANCE_OVER_NOISE: f64 = 10.0;
 const MIN_SECOND_VARIANCE: f64 = 0.02;
 /// Motion that is taken for noise, px.
-const NOISE_PX: f64 = 0.15;
+pub(super) const NOISE_PX: f64 = 0.15;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
 /// motion.
 const MIN_VARIANCE_OF_TRUNK: f64 = 0.1;

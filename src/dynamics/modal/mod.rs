@@ -32,8 +32,8 @@ use tree::{Branch, Decay, Tree};
 /// A mode is clear if its points gain so much by it, each (but for a quarter of them) and together;
 /// if its frequency is known to this standard deviation of the logarithm, and changes by less than
 /// this one where some of the points are left out; and if it is damped less than this.
-const MIN_GAIN: f64 = 25.0;
-const MIN_GAIN_TOGETHER: f64 = 120.0;
+const MIN_GAIN: f64 = 15.0;
+const MIN_GAIN_TOGETHER: f64 = 80.0;
 const MAX_LN_FREQUENCY_SD: f64 = 0.009;
 const MAX_JACKKNIFE_SD: f64 = 0.0045;
 const MAX_DAMPING: f64 = 0.15;
