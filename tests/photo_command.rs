@@ -475,7 +475,11 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         (format!("huge.png {strokes}"), FAILED, "100 megapixels"),
         (format!("half.png {strokes}"), FAILED, "no picture"),
         (format!("crown.json {strokes}"), FAILED, "no picture"),
-        (format!("sky.png {strokes}"), FAILED, "along stroke 1"),
+        (
+            format!("sky.png {strokes}"),
+            FAILED,
+            "along the trunk's stroke",
+        ),
         ("sky.png".into(), FAILED, "no tree"),
         (
             "photo.png --crown crown.json --branch off.json".into(),
@@ -484,13 +488,13 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         ),
         (
             "photo.png --crown crown.json --branch trunk.json --branch sky.json".into(),
-            FAILED,
-            "along stroke 2",
+            BAD_USAGE,
+            "meets no",
         ),
         (
             "photo.png --crown crown.json --branch sky.json".into(),
             FAILED,
-            "along stroke 1",
+            "along the trunk's stroke",
         ),
         (
             "photo.png --crown away.json --branch trunk.json".into(),

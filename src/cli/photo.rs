@@ -179,7 +179,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         let new = PhotoTree::new(parts, growth, config.clone());
         let mut new = new.map_err(|e| failure(&shown, own, e))?;
         new.tree.note.warnings.extend(found_note(tree, own));
-        new.tree.note.warnings.extend(grey_warning(tree));
+        new.tree.note.warnings.extend(warnings_of(tree));
         trees.push(new);
     }
     let forest = match trees.len() {
@@ -245,7 +245,7 @@ fn seen(
         if let Some(note) = found_note(&tree, own) {
             eprint_line(&format!("arborcam: note: {note}"));
         }
-        if let Some(warning) = grey_warning(&tree) {
+        for warning in warnings_of(&tree) {
             eprint_line(&format!("arborcam: warning: {}: {warning}", shown.name));
         }
         seen.push(tree);
@@ -269,16 +269,28 @@ fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
             format!(", the trunk differs from what is beside it by {deviations:.1} standard errors")
         });
     Some(format!(
-        "{what}: two attempts agree by {agreement:.0} %{trunk}; if it is wrong, draw with {missing}, or on the \
-         screen with --draw"
+        "{what}: two attempts agree by {agreement:.0} %{trunk}, which does not make it right; if it is \
+         wrong, draw with {missing}, or on the screen with --draw"
     ))
 }
 
-/// What is said of a picture without colours.
-fn grey_warning(tree: &TreeInPhoto) -> Option<String> {
-    let warning =
-        "the photograph has no colours, by which leaves are known: the tree is taken to be bare";
-    (!tree.has_colour).then(|| warning.to_owned())
+/// What is doubtful of a tree.
+fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !tree.has_colour {
+        warnings.push(
+            "the photograph has no colours, by which leaves are known: the tree is taken to be bare"
+                .to_owned(),
+        );
+    }
+    for index in &tree.seen.doubtful {
+        warnings.push(format!(
+            "along stroke {} nothing is seen that differs from what is at both its sides: it is a branch \
+             by its drawing alone",
+            index + 1
+        ));
+    }
+    warnings
 }
 
 /// The error of a tree that is drawn so: of the file with its strokes, or else of the photograph.

@@ -63,10 +63,10 @@ pub enum PhotoError {
     )]
     Apart { number: usize },
     #[error(
-        "along stroke {number} there is nothing that differs from what is at both its sides; draw it \
-         along bark, and the trunk's first"
+        "along the trunk's stroke there is nothing that differs from what is at both its sides; draw it \
+         along its bark"
     )]
-    OnNothing { number: usize },
+    OnNothing,
     #[error(
         "within the crown stroke are neither leaves nor branches that lead to the trunk; draw it round \
          the crown of the tree"
@@ -156,14 +156,12 @@ fn not_seen(e: NotSeen, drawn: &TreeStrokes) -> PhotoError {
     match e {
         NotSeen::Cancelled => PhotoError::Cancelled,
         NotSeen::Wood => PhotoError::NoWood,
-        NotSeen::Stroke(index) if has_trunk => PhotoError::OnNothing { number: index + 1 },
+        NotSeen::Trunk if has_trunk => PhotoError::OnNothing,
         NotSeen::LeavesOf(colour) => PhotoError::NoLeaves { colour },
         NotSeen::Crown if has_crown => PhotoError::EmptyCrown,
         NotSeen::Leaves if has_crown => PhotoError::NoCrown,
         NotSeen::Apart if has_crown && has_trunk => PhotoError::CrownApart,
-        NotSeen::Stroke(_) | NotSeen::Crown | NotSeen::Leaves | NotSeen::Apart => {
-            PhotoError::NoTree
-        }
+        NotSeen::Trunk | NotSeen::Crown | NotSeen::Leaves | NotSeen::Apart => PhotoError::NoTree,
         NotSeen::Failed(e) => failed(e),
     }
 }

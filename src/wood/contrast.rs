@@ -12,15 +12,9 @@ use nalgebra::{Point2, Vector2};
 /// How far beside a line is looked, as shares of the picture's width (8, 24 and 72 px of 1500): of
 /// these, what differs most counts, for a twig or a trunk.
 const BESIDE: [f64; 3] = [8.0 / 1500.0, 24.0 / 1500.0, 72.0 / 1500.0];
-/// A hand is so far off what it follows: of places across a line, as shares of the picture's width (2 and
-/// 4 px of 1500), the one with the highest score counts, on the line and at its sides.
-const ACROSS: [f64; 5] = [
-    -4.0 / 1500.0,
-    -2.0 / 1500.0,
-    0.0,
-    2.0 / 1500.0,
-    4.0 / 1500.0,
-];
+/// Of so many places across a line, as far as the hand may be off, the one with the highest score counts, on
+/// the line and at its sides.
+const ACROSS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 /// Length of a piece of a line, as a share of the picture's width (20 px of 1500: textures repeat
 /// within less); a short line has so many pieces at least, and fewer in sight say nothing.
 const PIECE: f64 = 20.0 / 1500.0;
@@ -53,10 +47,16 @@ pub fn along(
     line: &Stroke,
     size: Size,
     hides: &[bool],
+    off_px: f64,
     score: impl Fn(Point2<f64>) -> Option<f64>,
 ) -> Along {
     let width_px = f64::from(size.width);
-    let scene = Scene { size, hides, score };
+    let scene = Scene {
+        size,
+        hides,
+        off_px,
+        score,
+    };
     let pieces = Pieces::of(line, PIECE * width_px);
     let mut best = Along {
         deviations: None,
@@ -126,6 +126,7 @@ struct OfPiece {
 struct Scene<'a, S> {
     size: Size,
     hides: &'a [bool],
+    off_px: f64,
     score: S,
 }
 
@@ -155,10 +156,8 @@ impl<S: Fn(Point2<f64>) -> Option<f64>> Scene<'_, S> {
         if !self.size.contains(middle) || self.hides.get(pixel).is_none_or(|hides| *hides) {
             return None;
         }
-        let width_px = f64::from(self.size.width);
-        let across = ACROSS.iter();
-        let scores =
-            across.filter_map(|share| (self.score)(middle + share * width_px * place.left));
+        let across = ACROSS.iter().map(|share| share * self.off_px * place.left);
+        let scores = across.filter_map(|across| (self.score)(middle + across));
         scores.max_by(f64::total_cmp)
     }
 }
@@ -287,7 +286,7 @@ mod tests {
             ("across it", line([150.0, 20.0], [150.0, 180.0]), false),
             ("nothing", line([20.0, 40.0], [280.0, 60.0]), false),
         ] {
-            let found = along(&line, SIZE, &shown, light);
+            let found = along(&line, SIZE, &shown, 1.0, light);
             let deviations = found.deviations.expect("in sight");
             assert_eq!(deviations > 5.0, is_on, "{name}: {found:?}");
             assert!(is_on || deviations < 4.0, "{name}: {found:?}");
@@ -298,7 +297,13 @@ mod tests {
     #[test]
     fn what_is_hidden_says_nothing() {
         let hidden = vec![true; SIZE.area()];
-        let found = along(&line([20.0, 100.0], [280.0, 100.0]), SIZE, &hidden, light);
+        let found = along(
+            &line([20.0, 100.0], [280.0, 100.0]),
+            SIZE,
+            &hidden,
+            1.0,
+            light,
+        );
         assert_eq!((found.deviations, found.in_sight), (None, 0.0));
     }
 
