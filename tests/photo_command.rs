@@ -191,6 +191,57 @@ fn a_bare_tree_is_as_it_is_seen() {
 }
 
 #[test]
+fn a_grey_photograph_of_a_bare_tree_gets_a_warning() {
+    let scene = Scene::new(DynamicImage::from(photograph(false)).to_luma8());
+    let (tree, said) = scene.tree("", "tree");
+    let warning = "arborcam: warning: photo.png: the photograph has no colours";
+    assert!(said.contains(warning), "{said}");
+    assert!(tree.note.warnings.iter().any(|w| w.contains("no colours")));
+    assert_eq!(count(&tree.skeleton, NodeKind::Grown), 0);
+}
+
+/// A hand never draws the same line twice.
+#[test]
+fn strokes_half_a_pixel_beside_give_nearly_the_same_tree() {
+    let scene = Scene::new(photograph(true));
+    let (first, _) = scene.tree("", "first");
+    let moved = |line: &str| {
+        let mut line: serde_json::Value = serde_json::from_str(line).expect("json");
+        for at in line.as_array_mut().expect("a line") {
+            at[0] = (at[0].as_f64().expect("a number") + 0.5).into();
+        }
+        line
+    };
+    let trunk = format!("[{FOOT:?}, {FORK:?}, {:?}]", ENDS[0]);
+    for (name, key, line) in [
+        ("crown.json", "polygon_px", CROWN),
+        ("trunk.json", "polyline_px", &trunk),
+    ] {
+        let line = moved(line);
+        scene.write(
+            name,
+            &format!(r#"{{"width": 480, "height": 360, "{key}": {line}}}"#),
+        );
+    }
+    let (second, _) = scene.tree("", "second");
+    let of = |tree: &Document| {
+        let nodes = tree.skeleton.nodes.iter();
+        let traced = nodes.filter(|n| n.kind == NodeKind::Traced);
+        traced
+            .map(|n| tree.skeleton.image_from_model(&n.position))
+            .collect::<Vec<_>>()
+    };
+    let (first, second) = (of(&first), of(&second));
+    for at in &first {
+        let offs = second.iter().map(|other| (other - at).norm());
+        assert!(
+            offs.fold(f64::INFINITY, f64::min) < 12.0,
+            "{at}: {second:?}"
+        );
+    }
+}
+
+#[test]
 fn the_same_seed_gives_the_same_files_and_another_another_tree() {
     let scene = Scene::new(photograph(true));
     scene.tree("", "first");
@@ -297,6 +348,18 @@ fn several_trees_of_one_photograph_stand_in_one_scene() {
     }
     let dir = wood.to_str().expect("path");
     run(&["render", dir, "--out"], &scene.path("wood.png"));
+    // All of them sway as one scene.
+    let windy = ["animate", dir, "--wind", "5", "--seconds", "1", "--out"];
+    for name in ["windy.glb", "windy.png"] {
+        run(&windy, &scene.path(name));
+    }
+    let glb = fs::read(scene.path("windy.glb")).expect("glb");
+    let long = u32::from_le_bytes(glb[12..16].try_into().expect("four bytes")) as usize;
+    let note: serde_json::Value = serde_json::from_slice(&glb[20..20 + long]).expect("json");
+    let channels = note["animations"][0]["channels"].as_array().map(Vec::len);
+    assert_eq!(channels, Some(2), "{}", note["animations"]);
+    let read = |name: &str| fs::read(scene.path(name)).expect("png");
+    assert!(read("windy.png") != read("wood.png"));
 }
 
 #[test]
@@ -389,13 +452,34 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         "bare.svg",
         r#"<svg width="300" height="300"><path d="M150 290 V20"/></svg>"#,
     );
+    scene.write(
+        "away.json",
+        &crown("[[400, 15], [470, 15], [470, 110], [400, 110]]"),
+    );
+    scene.write(
+        "geo.json",
+        r#"{"type": "FeatureCollection", "features": []}"#,
+    );
+    scene.write(
+        "round.svg",
+        r#"<svg width="480" height="360"><path d="M100 20 L380 20 L390 190 L90 190 Z"/></svg>"#,
+    );
+    fs::write(scene.path("some.gif"), b"GIF89a\x01\0\x01\0").expect("write");
+    DynamicImage::from(photograph(false))
+        .to_luma8()
+        .save(scene.path("grey.png"))
+        .expect("png");
     let strokes = "--crown crown.json --branch trunk.json";
     for (arguments, status, expected) in [
         (format!("none.png {strokes}"), NO_INPUT, "cannot read"),
         (format!("huge.png {strokes}"), FAILED, "100 megapixels"),
         (format!("half.png {strokes}"), FAILED, "no picture"),
         (format!("crown.json {strokes}"), FAILED, "no picture"),
-        (format!("sky.png {strokes}"), FAILED, "wood"),
+        (
+            format!("sky.png {strokes}"),
+            FAILED,
+            "along the trunk's stroke",
+        ),
         ("sky.png".into(), FAILED, "no tree"),
         (
             "photo.png --crown crown.json --branch off.json".into(),
@@ -406,6 +490,47 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
             "photo.png --crown crown.json --branch trunk.json --branch sky.json".into(),
             BAD_USAGE,
             "meets no",
+        ),
+        (
+            "photo.png --crown crown.json --branch sky.json".into(),
+            FAILED,
+            "along the trunk's stroke",
+        ),
+        (
+            "photo.png --crown away.json --branch trunk.json".into(),
+            FAILED,
+            "neither leaves nor branches",
+        ),
+        (
+            "photo.png --crown trunk.json --branch crown.json".into(),
+            BAD_USAGE,
+            "its line is open",
+        ),
+        (
+            "photo.png --crown crown.json --branch crown.json".into(),
+            BAD_USAGE,
+            "no line along a branch",
+        ),
+        (
+            "photo.png --crown crown.json --branch round.svg".into(),
+            BAD_USAGE,
+            "is closed",
+        ),
+        (
+            format!("photo.png {strokes} --foliage red"),
+            FAILED,
+            "no red leaves",
+        ),
+        (
+            format!("grey.png {strokes} --foliage red"),
+            FAILED,
+            "no red leaves",
+        ),
+        (format!("some.gif {strokes}"), FAILED, "a GIF picture"),
+        (
+            "photo.png --crown geo.json --branch trunk.json".into(),
+            BAD_USAGE,
+            "holds no stroke",
         ),
         (
             "photo.png --crown flat.json --branch trunk.json".into(),
@@ -431,7 +556,7 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         (format!("cut.jpg {strokes}"), FAILED, "cut off"),
         (
             format!("photo.png {strokes} --frame 3"),
-            NO_INPUT,
+            BAD_USAGE,
             "single picture",
         ),
         (

@@ -1,5 +1,7 @@
-//! `arborcam animate DIR`: animates the tree of a capture with a motion that was not filmed.
+//! `arborcam animate DIR`: animates the tree of a capture, or the trees of a forest, with a motion that
+//! was not filmed.
 
+mod forest;
 mod live;
 mod options;
 
@@ -15,7 +17,7 @@ use super::tree::{Tail, print_warnings};
 use crate::animate::{
     Animator, Known, Loudness, Magnify, Wind, magnify, place_to_pull, wind_scale,
 };
-use crate::document::{DocumentError, MotionCsv};
+use crate::document::{DocumentError, ForestDocument, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html};
 use crate::files::{refuse_taken, write_files};
@@ -47,6 +49,9 @@ pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
         html::built_in()?;
     }
     let stop = Stop::on_signals()?;
+    if ForestDocument::is_in(&args.dir) {
+        return forest::run(args, out, kind, &stop);
+    }
     let sound = args.wav.as_deref().map(read_wav).transpose()?;
     let mut tree = prepare_tree(args)?;
     let (poses, what) = match args.magnify {
@@ -63,6 +68,11 @@ fn show_live(args: &AnimateArgs) -> Result<(), CommandError> {
         let why = "there is no terminal to show the tree on; give --out FILE (.glb, .html, .csv, \
                    .mp4 or .png)";
         return Err(CommandError::BadUsage(anyhow!(why)));
+    }
+    if ForestDocument::is_in(&args.dir) {
+        return Err(CommandError::BadUsage(anyhow!(
+            "a forest is not shown on the terminal; give --out FILE (.glb, .html, .mp4 or .png)"
+        )));
     }
     let sound = args.wav.as_deref().map(read_wav).transpose()?;
     let tree = prepare_tree(args)?;
@@ -292,14 +302,23 @@ fn write(
             return render::draw(tree, &shot, render::Kind::Picture, out, stop);
         }
     };
-    let files = files?;
+    write_model(out, &files?, tree.poses.len(), stop)
+}
+
+/// Writes the files of a model or a page beside `out`, and prints a line about it.
+fn write_model(
+    out: &Path,
+    files: &[NamedBytes],
+    poses: usize,
+    stop: &Stop,
+) -> Result<(), CommandError> {
     let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
     let folder = out.parent().unwrap_or(Path::new(""));
-    write_files(folder, &files, stop.while_writing()).map_err(write_error)?;
+    write_files(folder, files, stop.while_writing()).map_err(write_error)?;
     eprint_line(&format!(
         "{}: {} poses, {:.1} MB",
         out.display(),
-        tree.poses.len(),
+        poses,
         size as f64 / 1e6
     ));
     Ok(())

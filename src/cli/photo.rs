@@ -2,6 +2,7 @@
 
 mod draw;
 mod drawn;
+mod kept;
 mod picture;
 
 use super::command_error::CommandError;
@@ -35,12 +36,14 @@ pub struct PhotoArgs {
     #[command(flatten)]
     strokes: StrokeFiles,
     /// Draw crown and branches on the picture in the terminal, and see what is found after every
-    /// stroke; what is given by files is there already.
+    /// stroke; what is given by files is there already. What is drawn is kept as DIR-strokes-1.json and
+    /// so on, which --tree takes again.
     #[arg(long)]
     draw: bool,
-    /// The colour by which leaves are known.
-    #[arg(long, value_name = "COLOUR", default_value = "green")]
-    foliage: Foliage,
+    /// The colour by which leaves are known. A crown without leaves of it is an error; if no colour is
+    /// given they are green, and a tree without them is bare.
+    #[arg(long, value_name = "COLOUR")]
+    foliage: Option<Foliage>,
     /// A tree whose branches those that are not seen are like, and whose sway the tree is given: a
     /// capture, or what else `grow` takes as an example.
     #[arg(long, value_name = "EXAMPLE")]
@@ -151,11 +154,11 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     let shown = args.picture.read(&config.camera)?;
     let mut drawn = args.strokes.on(&shown)?;
     let options = PhotoOptions {
-        leaf_colour: args.foliage.into(),
+        leaf_colour: args.foliage.map(LeafColour::from),
         trace_by: config.skeleton.trace_by,
     };
     if args.draw {
-        drawn = draw::on_screen(&shown, drawn, options)?;
+        drawn = draw::on_screen(&shown, drawn, options, &args.out)?;
     }
     let stop = Stop::on_signals()?;
     let like = args.like()?;
@@ -176,6 +179,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         let new = PhotoTree::new(parts, growth, config.clone());
         let mut new = new.map_err(|e| failure(&shown, own, e))?;
         new.tree.note.warnings.extend(found_note(tree, own));
+        new.tree.note.warnings.extend(warnings_of(tree));
         trees.push(new);
     }
     let forest = match trees.len() {
@@ -241,6 +245,9 @@ fn seen(
         if let Some(note) = found_note(&tree, own) {
             eprint_line(&format!("arborcam: note: {note}"));
         }
+        for warning in warnings_of(&tree) {
+            eprint_line(&format!("arborcam: warning: {}: {warning}", shown.name));
+        }
         seen.push(tree);
     }
     Ok(seen)
@@ -255,10 +262,35 @@ fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
         (true, false) => ("the crown was found without a stroke", "--crown"),
         (false, _) => ("the trunk was found without a stroke", "--branch"),
     };
+    let trunk = tree
+        .seen
+        .trunk_deviations
+        .map_or(String::new(), |deviations| {
+            format!(", the trunk differs from what is beside it by {deviations:.1} standard errors")
+        });
     Some(format!(
-        "{what}: two attempts agree by {agreement:.0} %; if it is wrong, draw with {missing}, or on the \
-         screen with --draw"
+        "{what}: two attempts agree by {agreement:.0} %{trunk}, which does not make it right; if it is \
+         wrong, draw with {missing}, or on the screen with --draw"
     ))
+}
+
+/// What is doubtful of a tree.
+fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if !tree.has_colour {
+        warnings.push(
+            "the photograph has no colours, by which leaves are known: the tree is taken to be bare"
+                .to_owned(),
+        );
+    }
+    for index in &tree.seen.doubtful {
+        warnings.push(format!(
+            "along stroke {} nothing is seen that differs from what is at both its sides: it is a branch \
+             by its drawing alone",
+            index + 1
+        ));
+    }
+    warnings
 }
 
 /// The error of a tree that is drawn so: of the file with its strokes, or else of the photograph.

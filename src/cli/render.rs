@@ -1,4 +1,4 @@
-//! `arborcam render DIR`: draws pictures and videos of a capture, and pictures of a forest.
+//! `arborcam render DIR`: draws pictures and videos of a capture or a forest.
 
 mod options;
 
@@ -9,7 +9,9 @@ use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
 use crate::document::ForestDocument;
 use crate::files::{OutputFile, WriteError, refuse_taken};
-use crate::views::{PrepareError, PreparedForest, PreparedTree, Shot, Studio, VIDEO_S};
+use crate::views::{
+    ForestStudio, PrepareError, PreparedForest, PreparedTree, Shot, Studio, VIDEO_S,
+};
 use anyhow::anyhow;
 use std::path::Path;
 
@@ -28,10 +30,15 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
     refuse_taken(&args.out).map_err(write_error)?;
     let stop = Stop::on_signals()?;
     if ForestDocument::is_in(&args.dir) {
-        args.check_forest(kind)
+        args.check_forest()
             .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
-        let png = PreparedForest::read(&args.dir)?.picture(&args.shot())?;
-        return write_picture(&args.out, &png, &stop).map_err(write_error);
+        let forest = PreparedForest::read(&args.dir)?;
+        if kind == Kind::Video && !forest.sways() {
+            return Err(CommandError::BadUsage(anyhow!(
+                "the trees of this forest are at rest; `arborcam animate` lets them sway in a video"
+            )));
+        }
+        return draw_forest(&forest, &args.shot(), kind, &args.out, &stop);
     }
     let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
     if args.film.is_some() && tree.document.picture.is_none() {
@@ -59,6 +66,21 @@ pub fn draw(
             let png = studio.picture()?;
             write_picture(out, &png, stop).map_err(write_error)
         }
+        Kind::Video => studio.video(out, stop.while_writing()).map_err(video_error),
+    }
+}
+
+/// Draws a picture or video of a forest to the file `out`.
+pub fn draw_forest(
+    forest: &PreparedForest,
+    shot: &Shot,
+    kind: Kind,
+    out: &Path,
+    stop: &Stop,
+) -> Result<(), CommandError> {
+    let studio = ForestStudio::new(forest, shot)?;
+    match kind {
+        Kind::Picture => write_picture(out, &studio.picture()?, stop).map_err(write_error),
         Kind::Video => studio.video(out, stop.while_writing()).map_err(video_error),
     }
 }

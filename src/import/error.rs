@@ -17,6 +17,8 @@ pub enum ImportError {
     Unreadable { why: String },
     #[error("it holds no strokes; draw the trunk and the branches as lines or paths")]
     NoStrokes,
+    #[error("its line is open, as one along a branch is; draw a closed line round the crown")]
+    OpenCrown,
     #[error("it holds no crown; draw one closed line round it, and mark it `crown`")]
     NoCrown,
     #[error("{what}: {why}; correct it")]

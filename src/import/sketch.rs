@@ -11,6 +11,12 @@ pub(super) const MOST_POINTS: usize = 200_000;
 /// Sides of a picture, px.
 const SIDES_PX: std::ops::RangeInclusive<f64> = 64.0..=12_288.0;
 
+/// A line whose ends are farther apart than this share of its length is not drawn round anything: of
+/// half a circle it is 0.64.
+const MOST_GAP_SHARE: f64 = 0.6;
+/// And one whose ends are nearer to each other than this share is closed, as hands close lines.
+const CLOSED_GAP_SHARE: f64 = 0.05;
+
 /// A line along a branch, from its base to its tip or the other way.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
@@ -63,7 +69,7 @@ fn parsed(bytes: &[u8]) -> Result<Sketch, ImportError> {
     // Some editors put a byte order mark before it.
     let text = text.trim_start_matches('\u{feff}').trim_start();
     match text.chars().next() {
-        Some('{') => sketch_json::parse(text),
+        Some('{' | '[') => sketch_json::parse(text),
         Some('<') => svg::parse(text),
         Some(_) => Err(ImportError::bad_format("it is neither SVG nor JSON")),
         None => Err(ImportError::bad_format("it is empty")),
@@ -86,13 +92,14 @@ impl Sketch {
     /// Corners of the crown: of the line that is marked so, or of the only stroke, px.
     ///
     /// # Errors
-    /// No line is marked, and there is not one stroke alone.
+    /// No line is marked, and there is not one stroke alone, or that is no closed line.
     pub fn only_crown_px(self) -> Result<Vec<Point2<f64>>, ImportError> {
         if !self.crown_px.is_empty() {
             return Ok(self.crown_px);
         }
         let mut strokes = self.strokes.into_iter();
         match (strokes.next(), strokes.next()) {
+            (Some(only), None) if only.gap_share() > MOST_GAP_SHARE => Err(ImportError::OpenCrown),
             (Some(only), None) => Ok(only.points_px),
             _ => Err(ImportError::NoCrown),
         }
@@ -139,6 +146,21 @@ pub(super) fn refuse_more(
 }
 
 impl Stroke {
+    /// Whether it ends where it begins, as no branch does.
+    pub fn is_closed(&self) -> bool {
+        self.gap_share() < CLOSED_GAP_SHARE
+    }
+
+    /// How far its ends are apart, by its length.
+    fn gap_share(&self) -> f64 {
+        let [first, .., last] = self.points_px[..] else {
+            return 0.0;
+        };
+        let pieces = self.points_px.windows(2);
+        let length_px: f64 = pieces.map(|ends| (ends[1] - ends[0]).norm()).sum();
+        (last - first).norm() / length_px
+    }
+
     fn check(&self, size: Size) -> Result<(), ImportError> {
         for at in &self.points_px {
             if !at.iter().all(|x| x.is_finite()) {

@@ -52,6 +52,25 @@ impl BranchGraph {
         lengths.sum()
     }
 
+    /// Length of what of the branches is at places that `is_within` holds for, px.
+    pub fn length_within_px(&self, is_within: impl Fn(Point2<f64>) -> bool) -> f64 {
+        let mut length_px = 0.0;
+        for node in &self.nodes {
+            let Some(parent) = node.parent.and_then(|parent| self.nodes.get(parent)) else {
+                continue;
+            };
+            let way = node.position_px - parent.position_px;
+            let steps = way.norm().ceil().max(1.0);
+            for step in 0..steps as usize {
+                let share = (step as f64 + 0.5) / steps;
+                if is_within(parent.position_px + way * share) {
+                    length_px += way.norm() / steps;
+                }
+            }
+        }
+        length_px
+    }
+
     /// The piece of wood that is nearest to a place, as the node in which it ends; `None` where
     /// none is near. `size` is that of the picture.
     pub fn piece_at(&self, at_px: Point2<f64>, size: Size) -> Option<usize> {
@@ -150,6 +169,8 @@ mod tests {
     #[test]
     fn all_pieces_together_have_a_length() {
         assert!((fork().length_px() - 200.0).abs() < 1e-9);
+        assert!((fork().length_within_px(|_| true) - 200.0).abs() < 1e-9);
+        assert_eq!(fork().length_within_px(|_| false), 0.0);
         assert_eq!(fork().children(), [vec![1], vec![2, 3], vec![], vec![]]);
         assert_eq!(fork().tips(), 2);
     }

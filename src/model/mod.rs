@@ -75,7 +75,7 @@ pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};
 pub use track_table::TrackTable;
 pub use tree_mode::{LimbEnergy, TreeMode};
-pub use tree_strokes::TreeStrokes;
+pub use tree_strokes::{TreeStrokes, scaled};
 pub use user_notes::{NoteError, UserNote, UserNotes};
 pub use verdict::{Grade, Judgement, Verdict};
 pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight};

@@ -19,10 +19,29 @@ impl TreeStrokes {
 
     /// The same in a picture whose sides are `scale` times as long.
     pub fn scaled(&self, scale: f64) -> Self {
-        let scaled = |line: &Vec<Point2<f64>>| line.iter().map(|at| at * scale).collect();
+        let branches = self.branches_px.iter();
         Self {
-            crown_px: scaled(&self.crown_px),
-            branches_px: self.branches_px.iter().map(scaled).collect(),
+            crown_px: scaled(&self.crown_px, scale),
+            branches_px: branches.map(|line| scaled(line, scale)).collect(),
         }
+    }
+}
+
+/// The same places in a picture whose sides are `scale` times as long, px. Places are counted from the
+/// middle of the first pixel, and pictures from its corner.
+pub fn scaled(line: &[Point2<f64>], scale: f64) -> Vec<Point2<f64>> {
+    let places = line.iter().map(|at| at.map(|x| (x + 0.5) * scale - 0.5));
+    places.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four pixels become one: the middle of the four is the middle of the one.
+    #[test]
+    fn the_middle_of_a_picture_stays_there() {
+        let half = scaled(&[Point2::new(0.5, 0.5), Point2::new(-0.5, 3.5)], 0.5);
+        assert_eq!(half, [Point2::new(0.0, 0.0), Point2::new(-0.5, 1.5)]);
     }
 }

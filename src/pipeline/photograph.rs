@@ -7,7 +7,7 @@ use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Foot, FootBasis, Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError};
-use crate::wood::{self, LeafColour, SeenInPhotograph, Stroke};
+use crate::wood::{self, LeafColour, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
 /// Gaps between leaves up to this share of the photograph's width are closed; up to the second where one
@@ -23,10 +23,17 @@ const LEAST_TRUNK_ROWS: usize = 12;
 const MOST_HIDDEN_STEPS: u32 = 5;
 const HIDDEN_STEP: f64 = 0.05;
 
+/// Channels of a pixel that differ by more than this make a colour, levels: what a JPEG of a grey
+/// picture may be off. A picture has colours if this share of it has one.
+const GREY_LEVELS: u8 = 4;
+const COLOUR_SHARE: f64 = 0.001;
+
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotoOptions {
-    pub leaf_colour: LeafColour,
+    /// The colour of the leaves where it is known: then there must be some. Else green leaves are looked
+    /// for, and a tree without them is bare.
+    pub leaf_colour: Option<LeafColour>,
     pub trace_by: TraceBy,
 }
 
@@ -40,6 +47,8 @@ pub struct TreeInPhoto {
     /// How far two attempts to find the tree without strokes agree, 0 to 1; `None` where all was drawn.
     pub agreement: Option<f64>,
     pub seen: SeenInPhotograph,
+    /// Whether the photograph has colours; else leaves are not looked for.
+    pub has_colour: bool,
 }
 
 /// Why a photograph shows no tree. Each message is one line that says what to do.
@@ -53,6 +62,25 @@ pub enum PhotoError {
         "stroke {number} meets no wood that leads to the trunk; draw it from the branch that carries it"
     )]
     Apart { number: usize },
+    #[error(
+        "along the trunk's stroke there is nothing that differs from what is at both its sides; draw it \
+         along its bark"
+    )]
+    OnNothing,
+    #[error(
+        "within the crown stroke are neither leaves nor branches that lead to the trunk; draw it round \
+         the crown of the tree"
+    )]
+    EmptyCrown,
+    #[error(
+        "within the crown stroke the leaves have the colours of what is around it, as on a lawn; draw it \
+         round the crown of the tree"
+    )]
+    NoCrown,
+    #[error("the crown stroke and the trunk are apart; draw both on the same tree")]
+    CrownApart,
+    #[error("the crown has no {} leaves; name their colour, or none", .colour.name())]
+    NoLeaves { colour: LeafColour },
     #[error("no tree with a trunk is found in its middle; draw its crown and its trunk")]
     NoTree,
     #[error("no wood is seen that leads to the foot of the trunk; draw the trunk on its bark")]
@@ -99,6 +127,7 @@ pub fn see_tree(
         strokes,
         agreement,
     } = Drawn::of(picture, drawn)?;
+    let has_colour = has_colour(picture);
     let view = wood::Photograph {
         picture,
         crown: &crown,
@@ -106,12 +135,7 @@ pub fn see_tree(
         leaf_colour: options.leaf_colour,
         trace_by: options.trace_by,
     };
-    let seen = wood::in_photograph(view, cancel).map_err(failed)?;
-    let seen = match seen {
-        Some(seen) => seen,
-        None if cancel.is_cancelled() => return Err(PhotoError::Cancelled),
-        None => return Err(PhotoError::NoWood),
-    };
+    let seen = wood::in_photograph(view, cancel).map_err(|e| not_seen(e, drawn))?;
     let branches = &seen.wood.branches;
     let is_met = |at: &Point2<f64>| branches.piece_at(*at, picture.size).is_some();
     if let Some(apart) = strokes.iter().position(|s| !s.iter().any(is_met)) {
@@ -122,7 +146,35 @@ pub fn see_tree(
         strokes,
         agreement,
         seen,
+        has_colour,
     })
+}
+
+/// Why nothing is seen, by what was drawn: what was only found is no stroke that could be at fault.
+fn not_seen(e: NotSeen, drawn: &TreeStrokes) -> PhotoError {
+    let (has_crown, has_trunk) = (!drawn.crown_px.is_empty(), !drawn.branches_px.is_empty());
+    match e {
+        NotSeen::Cancelled => PhotoError::Cancelled,
+        NotSeen::Wood => PhotoError::NoWood,
+        NotSeen::Trunk if has_trunk => PhotoError::OnNothing,
+        NotSeen::LeavesOf(colour) => PhotoError::NoLeaves { colour },
+        NotSeen::Crown if has_crown => PhotoError::EmptyCrown,
+        NotSeen::Leaves if has_crown => PhotoError::NoCrown,
+        NotSeen::Apart if has_crown && has_trunk => PhotoError::CrownApart,
+        NotSeen::Trunk | NotSeen::Crown | NotSeen::Leaves | NotSeen::Apart => PhotoError::NoTree,
+        NotSeen::Failed(e) => failed(e),
+    }
+}
+
+/// Whether a picture is more than grey.
+fn has_colour(picture: &Rgb) -> bool {
+    let is_coloured = |pixel: &&[u8; 3]| {
+        let [red, green, blue] = **pixel;
+        red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
+    };
+    let (pixels, _) = picture.pixels.as_chunks::<3>();
+    let coloured = pixels.iter().filter(is_coloured).count();
+    coloured as f64 > COLOUR_SHARE * pixels.len() as f64
 }
 
 impl TreeInPhoto {

@@ -12,6 +12,7 @@
 //! ends, then the model does and writes the capture.
 
 mod announce;
+mod asked;
 mod background;
 mod capture_tables;
 mod finish;
@@ -46,6 +47,7 @@ mod track_thread;
 mod unfinished;
 mod watched;
 
+pub use asked::{Answer, Asked};
 pub use finish::Written;
 pub use job::{Job, Summary};
 pub use one_frame::{FrameError, one_frame};

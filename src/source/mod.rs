@@ -30,7 +30,7 @@ pub use error::{SourceError, group_name};
 pub use identity::{Identity, Places};
 pub use interface::{Health, Source, SourceInfo, Successor};
 pub use loopback::Loopback;
-pub use photograph::{Photograph, PhotographError};
+pub use photograph::{Photograph, PhotographError, image_format};
 
 use crate::config;
 use std::os::unix::fs::FileTypeExt;

@@ -21,6 +21,9 @@ pub struct Photograph {
     pub full_size: Size,
 }
 
+/// What a HEIC file says to be (ISO/IEC 23008-12).
+const HEIC_BRANDS: [&[u8; 4]; 4] = [b"heic", b"heix", b"mif1", b"msf1"];
+
 /// Why a file gives no photograph. Each message is one line that says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum PhotographError {
@@ -28,6 +31,8 @@ pub enum PhotographError {
         "it is no picture that can be read ({what}); give a PNG or JPEG file, or --frame for a film"
     )]
     BadFormat { what: String },
+    #[error("it is a {format} picture, which is not read; save it as PNG or JPEG, and give that")]
+    OtherFormat { format: &'static str },
     #[error("it is damaged: the JPEG is cut off before its end; copy or export it anew")]
     CutOff,
     #[error("it has {megapixels} megapixels, and at most 64 are read; reduce it")]
@@ -43,9 +48,11 @@ impl Photograph {
     /// # Errors
     /// It is damaged, of another format, too large or too small.
     pub fn read(bytes: &[u8]) -> Result<Self, PhotographError> {
-        // The decoder fills what is missing with grey, and does not say so.
-        if image::guess_format(bytes).ok() == Some(ImageFormat::Jpeg) && is_cut_off(bytes) {
-            return Err(PhotographError::CutOff);
+        match image_format(bytes) {
+            // The decoder fills what is missing with grey, and does not say so.
+            Some("JPEG") if is_cut_off(bytes) => return Err(PhotographError::CutOff),
+            None | Some("JPEG" | "PNG" | "BMP") => {}
+            Some(format) => return Err(PhotographError::OtherFormat { format }),
         }
         let mut reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
@@ -111,6 +118,27 @@ impl Photograph {
                 pixels: reduced.into_raw(),
             },
         })
+    }
+}
+
+/// The name of the picture format that a file begins as; `None` for what is no picture.
+pub fn image_format(begin: &[u8]) -> Option<&'static str> {
+    if let Some([b'f', b't', b'y', b'p', brand @ ..]) = begin.get(4..12)
+        && HEIC_BRANDS.iter().any(|known| brand == known.as_slice())
+    {
+        return Some("HEIC");
+    }
+    match image::guess_format(begin).ok()? {
+        ImageFormat::Jpeg => Some("JPEG"),
+        ImageFormat::Png => Some("PNG"),
+        ImageFormat::Bmp => Some("BMP"),
+        ImageFormat::WebP => Some("WebP"),
+        ImageFormat::Gif => Some("GIF"),
+        ImageFormat::Tiff => Some("TIFF"),
+        ImageFormat::Avif => Some("AVIF"),
+        ImageFormat::OpenExr => Some("OpenEXR"),
+        ImageFormat::Qoi => Some("QOI"),
+        _ => None,
     }
 }
 
@@ -249,9 +277,14 @@ mod tests {
     #[test]
     fn what_is_no_photograph_is_refused_in_one_line() {
         let whole = png(&halves(200, 100).into());
+        let heic = [&[0, 0, 0, 24][..], b"ftypheic", &[0; 12]].concat();
         for (bytes, expected) in [
             (b"no picture".to_vec(), "no picture"),
             (whole[..whole.len() / 2].to_vec(), "no picture"),
+            (b"GIF89a\x01\0\x01\0".to_vec(), "it is a GIF"),
+            (b"RIFF\x20\0\0\0WEBPVP8 ".to_vec(), "it is a WebP"),
+            (b"II*\0\x08\0\0\0".to_vec(), "it is a TIFF"),
+            (heic, "it is a HEIC"),
             (png(&halves(30, 100).into()), "64 px a side"),
             (
                 png(&DynamicImage::new_luma8(10_000, 10_000)),

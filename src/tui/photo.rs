@@ -36,11 +36,15 @@ pub trait PhotoSession {
     fn name(&self) -> &str;
     /// The picture that is drawn on; places are in its pixels.
     fn picture(&self) -> Arc<Rgb>;
-    /// What is found with the strokes of one tree, or why nothing is, in one line.
+    /// Begins to look for a tree along these strokes, and gives up what was begun before.
+    fn look(&mut self, strokes: &TreeStrokes);
+    /// What was found, once it is there, or why nothing was, in one line.
+    fn found(&mut self) -> Option<Result<FoundTree, String>>;
+    /// Keeps the strokes of all trees as files, and gives their names.
     ///
     /// # Errors
-    /// There is no tree, or a stroke is not on it.
-    fn look(&mut self, strokes: &TreeStrokes) -> Result<FoundTree, String>;
+    /// Nothing is drawn, or a file cannot be written, in one line.
+    fn keep(&mut self, trees: &[TreeStrokes]) -> Result<String, String>;
 }
 
 /// What is found of one tree.
@@ -61,10 +65,12 @@ pub(super) enum Action {
     Undo,
     NextTree,
     Found,
+    Save,
+    Leave,
     Quit,
 }
 
-pub(super) const KEYS: [Binding<Action>; 7] = [
+pub(super) const KEYS: [Binding<Action>; 9] = [
     bind(
         KeyCode::Char('c'),
         "c",
@@ -81,8 +87,10 @@ pub(super) const KEYS: [Binding<Action>; 7] = [
     ),
     bind(KeyCode::Char('u'), "u", "undo", "", Action::Undo),
     bind(KeyCode::Char('n'), "n", "next tree", "", Action::NextTree),
-    bind(KeyCode::Char('w'), "w", "what is found", "", Action::Found),
+    bind(KeyCode::Char('w'), "w", "found", "", Action::Found),
+    bind(KeyCode::Char('s'), "s", "save", "", Action::Save),
     bind(KeyCode::Enter, "Enter", "accept", "", Action::Accept),
+    bind(KeyCode::Esc, "Esc", "", "", Action::Leave),
     bind(KeyCode::Char('q'), "q", "quit", "", Action::Quit),
 ];
 
@@ -92,6 +100,8 @@ pub(super) enum Next {
     Stay,
     /// What is drawn has changed: look anew.
     Look,
+    /// Keep the strokes as files.
+    Save,
     Accept,
     Quit,
 }
@@ -121,6 +131,14 @@ pub(super) struct Sheet {
     trees: Vec<Tree>,
     /// The trees as they were before each change, the last change last.
     before: Vec<Vec<Tree>>,
+    looking: Option<Looking>,
+}
+
+/// The tree that is looked at, and since when.
+#[derive(Clone, Copy, Debug)]
+struct Looking {
+    tree: usize,
+    began: Instant,
 }
 
 impl Sheet {
@@ -136,32 +154,64 @@ impl Sheet {
             picture: session.picture(),
             trees,
             before: Vec::new(),
+            looking: None,
         };
         sheet.state.wood = true;
         sheet.show();
         sheet
     }
 
-    /// Looks at every tree of which nothing is known yet, and shows what is found.
+    /// Begins to look at a tree of which nothing is known yet, or shows what was found meanwhile.
     pub fn look(&mut self, session: &mut dyn PhotoSession) {
-        let began = Instant::now();
-        for tree in self.trees.iter_mut().filter(|tree| tree.found.is_none()) {
-            tree.found = Some(Arc::new(session.look(&tree.strokes)));
+        if let Some(Looking { tree, began }) = self.looking {
+            let Some(found) = session.found() else {
+                return;
+            };
+            self.looking = None;
+            if let Some(tree) = self.trees.get_mut(tree) {
+                tree.found = Some(Arc::new(found));
+            }
+            if !self.is_stale() {
+                let told = self.told();
+                let took_s = began.elapsed().as_secs_f64();
+                self.state.say(format!("{told} ({took_s:.2} s)"));
+            }
+            self.show();
         }
-        let took_s = began.elapsed().as_secs_f64();
-        let told = self.told();
-        self.state.say(format!("{told} ({took_s:.2} s)"));
-        self.show();
+        if let Some(tree) = self.trees.iter().position(|tree| tree.found.is_none()) {
+            session.look(&self.trees[tree].strokes);
+            self.state.unsay();
+            self.looking = Some(Looking {
+                tree,
+                began: Instant::now(),
+            });
+        }
     }
 
     /// Whether a tree is still to be looked at.
-    pub fn is_stale(&self) -> bool {
+    fn is_stale(&self) -> bool {
         self.trees.iter().any(|tree| tree.found.is_none())
+    }
+
+    /// Keeps the strokes of all trees as files.
+    pub fn save(&mut self, session: &mut dyn PhotoSession) {
+        let trees = self.trees.iter().map(|tree| tree.strokes.clone());
+        let trees: Vec<TreeStrokes> = trees.collect();
+        self.state.say(match session.keep(&trees) {
+            Ok(files) => format!("Strokes saved: {files}"),
+            Err(why) => format!("No strokes saved: {why}"),
+        });
     }
 
     /// The strokes of all trees.
     pub fn accepted(self) -> Vec<TreeStrokes> {
-        self.trees.into_iter().map(|tree| tree.strokes).collect()
+        let trees = self.trees.into_iter().map(|tree| tree.strokes);
+        let mut trees: Vec<TreeStrokes> = trees.collect();
+        // A further tree that was begun, and of which nothing was drawn.
+        if trees.len() > 1 {
+            trees.retain(|strokes| !strokes.is_empty());
+        }
+        trees
     }
 
     /// Does what an event asks for; `placed` is where the picture lies on the screen.
@@ -191,6 +241,12 @@ impl Sheet {
         if let Some(drawing) = self.state.drawing.take() {
             let Some(bound) = DRAWING.iter().find(|b| b.key == key.code) else {
                 self.state.drawing = Some(drawing);
+                if let Some(other) = KEYS.iter().find(|b| b.key == key.code) {
+                    let shown = other.shown;
+                    self.state.say(format!(
+                        "Enter ends the line that is drawn, Esc leaves it; then {shown} works again."
+                    ));
+                }
                 return Next::Stay;
             };
             return match draw(bound.action, drawing, &mut self.state, placed) {
@@ -213,6 +269,12 @@ impl Sheet {
                 self.show();
                 Next::Stay
             }
+            Some(Action::Save) => Next::Save,
+            Some(Action::Leave) => {
+                self.state
+                    .say("No line is drawn that Esc could leave; q quits.");
+                Next::Stay
+            }
             Some(Action::Accept) => self.accept(),
             Some(Action::Quit) => Next::Quit,
             None => Next::Stay,
@@ -228,6 +290,7 @@ impl Sheet {
             }
             tree.found = None;
         }
+        self.looking = None;
         self.show();
         Next::Look
     }
@@ -246,13 +309,14 @@ impl Sheet {
             return Next::Stay;
         };
         self.trees = before;
+        self.looking = None;
         self.show();
+        if self.is_stale() {
+            return Next::Look;
+        }
         let told = self.told();
         self.state.say(format!("Undone. {told}"));
-        match self.is_stale() {
-            true => Next::Look,
-            false => Next::Stay,
-        }
+        Next::Stay
     }
 
     fn next_tree(&mut self) -> Next {
@@ -274,9 +338,12 @@ impl Sheet {
     }
 
     fn accept(&mut self) -> Next {
-        for (number, tree) in (1..).zip(&self.trees) {
-            let Some(Err(why)) = tree.found.as_deref() else {
-                continue;
+        let is_begun = |tree: &Tree| self.trees.len() == 1 || !tree.strokes.is_empty();
+        for (number, tree) in (1..).zip(&self.trees).filter(|(_, tree)| is_begun(tree)) {
+            let why = match tree.found.as_deref() {
+                Some(Ok(_)) => continue,
+                Some(Err(why)) => why.as_str(),
+                None => "it is still looked at",
             };
             let of_tree = if self.trees.len() > 1 {
                 format!("tree {number}: ")
@@ -362,9 +429,14 @@ impl Sheet {
         );
         frame.render_widget(Line::styled(title, theme.strong()), line);
         preview::render(frame, &self.state, sheet, theme, picture);
-        match self.state.messages().next() {
-            Some(_) => messages::render(frame, &self.state, message, theme),
-            None => {
+        match (self.looking, self.state.messages().next()) {
+            (_, Some(_)) => messages::render(frame, &self.state, message, theme),
+            (Some(looking), None) => {
+                let since_s = looking.began.elapsed().as_secs_f64();
+                let told = format!(" · Looking… {since_s:.1} s (keys work meanwhile)");
+                frame.render_widget(Line::styled(told, theme.strong()), message);
+            }
+            (None, None) => {
                 let told = Line::styled(format!(" · {}", self.told()), theme.faint());
                 frame.render_widget(told, message);
             }
@@ -372,7 +444,8 @@ impl Sheet {
         match self.state.drawing {
             Some(_) => messages::keys(frame, &self.state, keys, theme),
             None => {
-                messages::key_line(frame, KEYS.iter().map(|b| (b.shown, b.short)), keys, theme);
+                let named = KEYS.iter().filter(|b| !b.short.is_empty());
+                messages::key_line(frame, named.map(|b| (b.shown, b.short)), keys, theme);
             }
         }
     }
@@ -439,7 +512,6 @@ pub fn draw_on_photo(
     let theme = Theme::new(options.depth);
     let mut picture = Preview::new(graphics);
     let mut sheet = Sheet::new(session, begun);
-    sheet.state.say("Looking…");
     while !stop.load(Ordering::SeqCst) {
         let began = Instant::now();
         sheet.state.tick();
@@ -451,10 +523,7 @@ pub fn draw_on_photo(
             }
         }
         picture.drawn(began, Instant::now());
-        if sheet.is_stale() {
-            sheet.look(session);
-            continue;
-        }
+        sheet.look(session);
         match tty.wait(TICK.saturating_sub(began.elapsed())) {
             Input::Gone => break,
             Input::Quiet => continue,
@@ -471,11 +540,8 @@ pub fn draw_on_photo(
             }
             match sheet.handle(&event, picture.placed.as_ref()) {
                 Next::Stay => {}
-                // What is drawn is seen before the look begins.
-                Next::Look => {
-                    sheet.state.say("Looking…");
-                    break;
-                }
+                Next::Look => sheet.look(session),
+                Next::Save => sheet.save(session),
                 Next::Accept => return Ok(Some(sheet.accepted())),
                 Next::Quit => return Ok(None),
             }

@@ -1,15 +1,11 @@
-//! A forest with its templates: its files, a picture and a page of it.
+//! A forest with its templates: its files, and a page of it.
 
-use super::studio::{PLAIN, model, png, samples};
-use super::{PrepareError, PreparedTree, Shot, TreeOptions};
+use super::{PrepareError, PreparedTree, TreeOptions};
 use crate::document::note::Software;
 use crate::document::{Document, ForestDocument};
-use crate::draw::{BoundingCylinder, Camera, Look, Placed, Posed, scene};
 use crate::export::forest::{ForestModel, ForestTemplate, forest_files, moving_glb};
 use crate::export::gltf::NamedBytes;
 use crate::export::{ExportError, html};
-use crate::geometry::{GROUND_RGB, ground};
-use nalgebra::{Point3, Vector3};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -68,12 +64,7 @@ impl PreparedForest {
     /// # Errors
     /// As of [`files`](Self::files), or the program was built without the page.
     pub fn page(&self, title: &str) -> Result<Vec<u8>, ExportError> {
-        let templates = self.export_templates();
-        let glb = moving_glb(&ForestModel {
-            forest: &self.document.forest,
-            templates: &templates,
-            provenance: &self.provenance(),
-        })?;
+        let glb = self.moving_glb()?;
         let facts = html::ForestFacts {
             trees: self.document.forest.trees.len() as u64,
             templates: self.templates.len() as u64,
@@ -112,60 +103,33 @@ impl PreparedForest {
         })
     }
 
-    /// The bytes of a picture (PNG) of the forest at rest. Of `shot` the view, the size, the
-    /// background, whether it is bare and whether it has shadows count.
+    /// Whether any of its trees moves.
+    pub fn sways(&self) -> bool {
+        self.templates.iter().any(|tree| tree.poses.len() > 1)
+    }
+
+    /// Whether trees of one template move one after the other, which they can in a loop only.
+    pub fn is_staggered(&self) -> bool {
+        self.document.forest.trees.iter().any(|tree| tree.ahead > 0)
+    }
+
+    /// The model in motion (GLB); at rest where no tree moves.
     ///
     /// # Errors
-    /// There is nothing to be drawn of a template.
-    pub fn picture(&self, shot: &Shot) -> Result<Vec<u8>, PrepareError> {
-        let size = shot.size.unwrap_or(PLAIN);
-        let mut models = Vec::with_capacity(self.templates.len());
-        for tree in &self.templates {
-            let wood = tree.dressed.wood.first();
-            let wood = wood.ok_or(PrepareError::NothingToDraw)?;
-            models.push(model(tree, wood, shot.bare));
-        }
-        let posed: Vec<Posed> = models.iter().map(|m| m.posed(None, &[])).collect();
-        let forest = &self.document.forest;
-        let mut trees = Vec::with_capacity(forest.trees.len());
-        for tree in &forest.trees {
-            trees.push(Placed {
-                posed: posed
-                    .get(tree.template)
-                    .ok_or(PrepareError::NothingToDraw)?,
-                foot: tree.foot,
-                turn_rad: tree.turn_rad,
-                scale: tree.scale * forest.metres_per_px,
-            });
-        }
-        let mesh = ground(&forest.ground);
-        let ground = Posed::of_mesh(&mesh, GROUND_RGB);
-        let bounds = bounds(&ground, &trees).ok_or(PrepareError::NothingToDraw)?;
-        let look = Look {
-            samples: samples(size),
-            shadow: shot.turntable && forest.ground.is_flat(),
-            ..Look::default()
-        };
-        let camera = Camera::fitting(&bounds, shot.view, false, size);
-        let mut below = crate::draw::Rgba::of_one(size, shot.background);
-        below.put(&scene(&ground, &trees, &camera, &look));
-        Ok(png(&below)?)
+    /// As of [`files`](Self::files).
+    pub fn moving_glb(&self) -> Result<Vec<u8>, ExportError> {
+        let templates = self.export_templates();
+        moving_glb(&ForestModel {
+            forest: &self.document.forest,
+            templates: &templates,
+            provenance: &self.provenance(),
+        })
     }
-}
 
-/// What holds the ground and all trees in any turn.
-fn bounds(ground: &Posed, trees: &[Placed]) -> Option<BoundingCylinder> {
-    let mut points = Vec::new();
-    if let Some(plot) = ground.bounds() {
-        points.extend([plot.low, plot.high]);
+    /// Metres of a pixel of a template, as it stands in the forest.
+    pub fn metres_per_px(&self, template: usize) -> f64 {
+        let forest = &self.document.forest;
+        let first = forest.trees.iter().find(|tree| tree.template == template);
+        forest.metres_per_px * first.map_or(1.0, |tree| tree.scale)
     }
-    for tree in trees {
-        let Some(own) = tree.posed.bounds() else {
-            continue;
-        };
-        let reach = Vector3::new(own.radius, 0.0, own.radius) * tree.scale;
-        let up = |y: f64| Point3::new(tree.foot.x, tree.foot.y + y * tree.scale, tree.foot.z);
-        points.extend([up(own.low.y) - reach, up(own.high.y) + reach]);
-    }
-    BoundingCylinder::of(points)
 }

@@ -6,6 +6,7 @@ mod drawn;
 mod error;
 mod forest;
 mod forest_plan;
+mod forest_studio;
 mod loops;
 mod offspring;
 #[cfg(feature = "opencv")]
@@ -23,6 +24,7 @@ pub use drawn::DrawnTree;
 pub use error::PrepareError;
 pub use forest::PreparedForest;
 pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
+pub use forest_studio::ForestStudio;
 pub use offspring::{
     Likeness, Offspring, OffspringMotion, OffspringOptions, Parent, outline_of as example_outline,
 };

@@ -208,11 +208,8 @@ impl<'a> Studio<'a> {
         let Some(k) = k else {
             return self.model.posed(None, &[]);
         };
-        let groups = self.tree.flutter.iter();
-        let swing: Vec<LeafSwing> = groups
-            .map(|all| all.get(k).copied().unwrap_or_default())
-            .collect();
-        self.model.posed(self.tree.poses.get(k), &swing)
+        self.model
+            .posed(self.tree.poses.get(k), &swing_at(self.tree, k))
     }
 
     /// Which pose is that of a moment of the film.
@@ -225,6 +222,13 @@ impl<'a> Studio<'a> {
                 last_s: poses.last().map_or(0.0, |p| p.time_s),
             })
     }
+}
+
+/// How the leaves of each group swing in a pose.
+pub(super) fn swing_at(tree: &PreparedTree, pose: usize) -> Vec<LeafSwing> {
+    let groups = tree.flutter.iter();
+    let swing = groups.map(|all| all.get(pose).copied().unwrap_or_default());
+    swing.collect()
 }
 
 /// The tree as it is drawn, with `wood`.
@@ -285,7 +289,7 @@ fn bounds(tree: &PreparedTree, model: &Model) -> BoundingCylinder {
     BoundingCylinder::of(joints.map(|j| j.position)).map_or(rest, |all| all.with(&rest))
 }
 
-fn rgb(drawn: &Rgba) -> Vec<u8> {
+pub(super) fn rgb(drawn: &Rgba) -> Vec<u8> {
     let pixels = drawn.pixels.chunks_exact(4);
     pixels.flat_map(|p| [p[0], p[1], p[2]]).collect()
 }
@@ -304,7 +308,7 @@ pub(super) fn png(drawn: &Rgba) -> Result<Vec<u8>, ExportError> {
     Ok(png.into_inner())
 }
 
-fn nearest(poses: &[Pose], time_s: f64) -> Option<usize> {
+pub(super) fn nearest(poses: &[Pose], time_s: f64) -> Option<usize> {
     let after = poses.partition_point(|p| p.time_s < time_s);
     let around = after.saturating_sub(1)..poses.len().min(after + 1);
     around.min_by(|a, b| {

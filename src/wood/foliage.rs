@@ -6,11 +6,11 @@
 //! intersection over union with the truth is 0.89 to 0.94 instead of 0.74 to 0.92. The data term
 //! is that of the paper with leaf and background exchanged, as they are in print.
 
+use super::colours::{Colours, colour_at};
 use super::cut::{PAIRS, is_diagonal, least_cut, links_within};
 use super::mixture::{Mixture, Normal};
 use crate::cancel::CancelToken;
 use crate::model::{Rgb, bounds_px};
-use crate::random::generator;
 use crate::signal::statistics::otsu;
 use nalgebra::Vector3;
 
@@ -20,8 +20,6 @@ const PARTS: usize = 10;
 /// neighbours in it, grey levels: the paper's term has no bound.
 const SMOOTH: f64 = 60.0;
 const LEAST_DIFFERENCE: f64 = 1.0;
-/// Colours that a mixture is learned from, at most.
-const MOST_COLOURS: usize = 12_000;
 /// Light that is added to a part's before its share of a colour is taken: dark parts count as grey.
 const DARK: f64 = 30.0;
 /// No leaf has less of its colour than this, see [`LeafColour::score`].
@@ -29,7 +27,7 @@ const LEAST_SCORE: f64 = 0.125;
 /// Parts of the mixture of the ground below a crown; fewer colours than this show none. In the upper part
 /// of the crown, by this share of its height, there is no ground.
 const GROUND_PARTS: usize = 5;
-const LEAST_GROUND: usize = 400;
+const LEAST_GROUND: f64 = 400.0;
 const HIGH_SHARE: f64 = 0.75;
 /// A crown is in leaf where leaves have so great a share of it.
 const IN_LEAF: f64 = 0.15;
@@ -47,6 +45,16 @@ pub enum LeafColour {
 }
 
 impl LeafColour {
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Green => "green",
+            Self::Red => "red",
+            Self::Yellow => "yellow",
+            Self::White => "white",
+        }
+    }
+
     /// How much a colour (red, green, blue; 0 to 255) is of this one: above 0 by its share of the
     /// light, 1 at most.
     fn score(self, colour: &Vector3<f64>) -> f64 {
@@ -73,15 +81,14 @@ pub fn foliage(
     cancel: &CancelToken,
 ) -> Option<Vec<u8>> {
     let bare = vec![0; picture.size.area()];
-    let colours = sampled(picture, |i| region[i] != 0);
-    let mixture = Mixture::learned(&colours, PARTS, &mut generator(0, 0));
+    let mixture = Mixture::learned(&Colours::of(picture, |i| region[i] != 0), PARTS);
     let ground = Ground::under(picture, region);
     let Some(clusters) = Clusters::of(&mixture, colour) else {
         return Some(bare);
     };
     let mut odds = vec![0.0; picture.size.area()];
     for (i, odds) in odds.iter_mut().enumerate().filter(|(i, _)| region[*i] != 0) {
-        let colour = pixel(picture, i);
+        let colour = colour_at(picture, i);
         let of_ground = ground
             .as_ref()
             .map_or(0.0, |ground| ground.density(i, &colour));
@@ -139,10 +146,10 @@ impl Ground {
         for (i, _) in region.iter().enumerate().filter(|(_, m)| **m != 0) {
             lowest[i % width] = Some(i);
         }
-        let under = sampled(picture, |i| lowest[i % width].is_some_and(|last| i > last));
+        let under = Colours::of(picture, |i| lowest[i % width].is_some_and(|last| i > last));
         let first_row = f64::from(top) + HIGH_SHARE * f64::from(bottom - top);
-        (under.len() >= LEAST_GROUND).then(|| Self {
-            colours: Mixture::learned(&under, GROUND_PARTS, &mut generator(0, 3)),
+        (under.count() >= LEAST_GROUND).then(|| Self {
+            colours: Mixture::learned(&under, GROUND_PARTS),
             first_low: first_row as usize * width,
         })
     }
@@ -161,25 +168,11 @@ fn level(score: f64) -> usize {
     (100.0 + 200.0 * score).clamp(0.0, 255.0) as usize
 }
 
-/// Colours (red, green, blue) of the pixels that `is_wanted` holds for, evenly spread over them: as
-/// many as a mixture is learned from.
-pub(super) fn sampled(picture: &Rgb, is_wanted: impl Fn(usize) -> bool) -> Vec<Vector3<f64>> {
-    let wanted: Vec<usize> = (0..picture.size.area()).filter(|i| is_wanted(*i)).collect();
-    let count = wanted.len().min(MOST_COLOURS);
-    let places = (0..count).map(|k| wanted[k * wanted.len() / count]);
-    places.map(|i| pixel(picture, i)).collect()
-}
-
-/// The colour of a pixel, red first, 0 to 255.
-pub(super) fn pixel(picture: &Rgb, i: usize) -> Vector3<f64> {
-    Vector3::from_fn(|channel, _| f64::from(picture.pixels[3 * i + channel]))
-}
-
 /// What it costs that neighbours differ: lambda by the difference of their colours (Tan et al. 2008
 /// sect. 2.1), between the four neighbours of a pixel.
 fn links(picture: &Rgb, region: &[u8]) -> Vec<[f32; PAIRS]> {
     links_within(region, picture.size, |i, next, pair| {
-        let apart = (pixel(picture, i) - pixel(picture, next)).norm();
+        let apart = (colour_at(picture, i) - colour_at(picture, next)).norm();
         match is_diagonal(pair) {
             true => 0.0,
             false => SMOOTH / apart.max(LEAST_DIFFERENCE),

@@ -440,29 +440,36 @@ fn enlarged_region(region: &[u8], size: Size, scale: u32) -> Vec<u8> {
     out
 }
 
+/// Places of lines are given to OpenCV in parts of a pixel, so many bits of them.
+const PIXEL_BITS: i32 = 4;
+
 /// Which pixels of the mask `wood` the strokes are drawn on.
 pub(super) fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
     let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
     let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
+    let width = STROKE_PX * wood.scale as i32;
     for stroke in strokes {
-        let mut corners = Vector::<Point>::new();
-        for corner in stroke {
-            let at = wood.to_mask(*corner);
-            let [u, v] = [at.x, at.y].map(|c| c.round().clamp(-FARTHEST, FARTHEST) as i32);
-            corners.push(Point::new(u, v));
-        }
-        let white = Scalar::all(1.0);
-        polylines(
-            &mut mask,
-            &corners,
-            false,
-            white,
-            STROKE_PX * wood.scale as i32,
-            LINE_8,
-            0,
-        )?;
+        let places: Stroke = stroke.iter().map(|at| wood.to_mask(*at)).collect();
+        draw_line(&mut mask, &places, Scalar::all(1.0), width)?;
     }
     Ok(mask.data_bytes()?.iter().map(|m| *m != 0).collect())
+}
+
+/// Draws a line of this width, px. Its places are not rounded to pixels: one that is drawn half a pixel
+/// beside another covers nearly the same.
+pub(super) fn draw_line(
+    mask: &mut Mat,
+    places: &[Point2<f64>],
+    colour: Scalar,
+    width_px: i32,
+) -> opencv::Result<()> {
+    let parts = f64::from(1 << PIXEL_BITS);
+    let mut corners = Vector::<Point>::new();
+    for at in places {
+        let [u, v] = [at.x, at.y].map(|c| (parts * c.clamp(-FARTHEST, FARTHEST)).round() as i32);
+        corners.push(Point::new(u, v));
+    }
+    polylines(mask, &corners, false, colour, width_px, LINE_8, PIXEL_BITS)
 }
 
 /// Which pixels have the colours of the low trunk, are no leaves and rather move than stand still,

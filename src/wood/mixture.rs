@@ -1,12 +1,11 @@
 //! Colours of wood and of all else, as mixtures of normal distributions (Tan et al. 2008
 //! sect. 2.1), which OpenCV learns from pixels that are known; and such of any number of parts.
 
-use crate::random::Generator;
+use super::colours::{Bin, Colours};
 use nalgebra::{Matrix3, Vector3};
 use opencv::core::{Mat, Rect, Vec3b};
 use opencv::imgproc::{GC_BGD, GC_FGD, GC_INIT_WITH_MASK, grab_cut};
 use opencv::prelude::*;
-use rand::RngExt;
 
 /// Normal distributions of a mixture of OpenCV's.
 const PARTS: usize = 5;
@@ -116,6 +115,15 @@ impl Normal {
         })
     }
 
+    /// That of colours with this sum, a share of so many in `all`; `None` where it is too few.
+    fn of_sum(sum: &Bin, all: f64) -> Option<Self> {
+        if sum.count < LEAST_WEIGHT {
+            return None;
+        }
+        let floor = LEAST_DEVIATION.powi(2) * Matrix3::identity();
+        Self::of(sum.count / all, sum.mean(), &(sum.covariance() + floor))
+    }
+
     /// Without the factor that all mixtures have.
     fn density(&self, colour: &Vector3<f64>) -> f64 {
         let off = colour - self.mean;
@@ -125,54 +133,40 @@ impl Normal {
 
 impl Mixture {
     /// A mixture of at most `parts` normal distributions of these colours (Dempster, Laird and Rubin
-    /// 1977), begun at means that lie apart (Arthur and Vassilvitskii 2007). It has none where there
-    /// are fewer colours than parts.
-    pub fn learned(colours: &[Vector3<f64>], parts: usize, random: &mut Generator) -> Self {
-        if colours.len() < parts {
+    /// 1977), begun at groups that are parted across their greatest spread (Orchard and Bouman
+    /// 1991). No chance is in it: nearly the same colours give nearly the same mixture. It has none
+    /// where there are fewer colours than parts.
+    pub fn learned(colours: &Colours, parts: usize) -> Self {
+        let all = colours.count();
+        if all < parts as f64 {
             return Self { parts: Vec::new() };
         }
-        let means = means_apart(colours, parts, random);
-        let nearest_of = |colour: &Vector3<f64>| nearest(&means, colour);
-        let mut mixture = Self::of_shares(colours, parts, |i, k| {
-            f64::from(u8::from(nearest_of(&colours[i]) == k))
-        });
+        let groups = Groups::parted(colours, parts);
+        let sums = groups.sums.iter();
+        let mut mixture = Self {
+            parts: sums.filter_map(|sum| Normal::of_sum(sum, all)).collect(),
+        };
         for _ in 0..ROUNDS {
-            let mut shares = Vec::with_capacity(colours.len() * mixture.parts.len());
-            for colour in colours {
-                let of_all = mixture.density(colour);
-                let parts = mixture.parts.iter();
-                shares.extend(parts.map(|part| part.density(colour) / of_all));
-            }
-            let n_parts = mixture.parts.len();
-            mixture = Self::of_shares(colours, n_parts, |i, k| shares[i * n_parts + k]);
+            mixture = mixture.improved(colours, all);
         }
         mixture
     }
 
-    /// The normal distributions of colours of which each has a share in each part.
-    fn of_shares(
-        colours: &[Vector3<f64>],
-        parts: usize,
-        share: impl Fn(usize, usize) -> f64,
-    ) -> Self {
-        let mut learned = Vec::with_capacity(parts);
-        for k in 0..parts {
-            let (mut weight, mut sum, mut squares) = (0.0, Vector3::zeros(), Matrix3::zeros());
-            for (i, colour) in colours.iter().enumerate() {
-                let share = share(i, k);
-                weight += share;
-                sum += share * colour;
-                squares += share * colour * colour.transpose();
+    /// The normal distributions of the colours of which each has the share in each part that this
+    /// mixture gives it.
+    fn improved(&self, colours: &Colours, all: f64) -> Self {
+        let mut sums = vec![Bin::default(); self.parts.len()];
+        for bin in &colours.bins {
+            let colour = bin.mean();
+            let of_all = self.density(&colour);
+            for (sum, part) in sums.iter_mut().zip(&self.parts) {
+                sum.add(bin, part.density(&colour) / of_all);
             }
-            if weight < LEAST_WEIGHT {
-                continue;
-            }
-            let mean = sum / weight;
-            let floor = LEAST_DEVIATION.powi(2) * Matrix3::identity();
-            let covariance = squares / weight - mean * mean.transpose() + floor;
-            learned.extend(Normal::of(weight / colours.len() as f64, mean, &covariance));
         }
-        Self { parts: learned }
+        let sums = sums.iter();
+        Self {
+            parts: sums.filter_map(|sum| Normal::of_sum(sum, all)).collect(),
+        }
     }
 
     /// The mixture of these parts alone; their shares add up to 1.
@@ -208,40 +202,79 @@ impl Mixture {
     }
 }
 
-/// So many of the colours, each drawn with its squared distance from those before it.
-fn means_apart(
-    colours: &[Vector3<f64>],
-    count: usize,
-    random: &mut Generator,
-) -> Vec<Vector3<f64>> {
-    let mut means = vec![colours[random.random_range(0..colours.len())]];
-    let mut apart = vec![f64::INFINITY; colours.len()];
-    while means.len() < count {
-        let newest = means[means.len() - 1];
-        for (apart, colour) in apart.iter_mut().zip(colours) {
-            *apart = apart.min((colour - newest).norm_squared());
-        }
-        let mut left = random.random::<f64>() * apart.iter().sum::<f64>();
-        let drawn = apart.iter().position(|apart| {
-            left -= apart;
-            left <= 0.0
-        });
-        means.push(colours[drawn.unwrap_or(0)]);
-    }
-    means
+/// Colours in groups.
+struct Groups {
+    /// The group of each bin.
+    of_bin: Vec<usize>,
+    sums: Vec<Bin>,
 }
 
-/// Which of the means is nearest to a colour.
-fn nearest(means: &[Vector3<f64>], colour: &Vector3<f64>) -> usize {
-    let squared = |k: usize| (means[k] - colour).norm_squared();
-    let order = |a: &usize, b: &usize| squared(*a).total_cmp(&squared(*b));
-    (0..means.len()).min_by(order).unwrap_or(0)
+impl Groups {
+    /// So many groups at most: again and again the one with the greatest spread along any direction
+    /// is parted at its mean, across that direction.
+    fn parted(colours: &Colours, count: usize) -> Self {
+        let mut groups = Self {
+            of_bin: vec![0; colours.bins.len()],
+            sums: vec![Bin::default()],
+        };
+        for bin in &colours.bins {
+            groups.sums[0].add(bin, 1.0);
+        }
+        while groups.sums.len() < count && groups.part_widest(colours) {}
+        groups
+    }
+
+    /// Whether one could be parted.
+    fn part_widest(&mut self, colours: &Colours) -> bool {
+        let spreads = self.sums.iter().map(Spread::of).enumerate();
+        let widest = spreads.max_by(|(_, a), (_, b)| a.sum.total_cmp(&b.sum));
+        let Some((widest, spread)) = widest else {
+            return false;
+        };
+        let mean = self.sums[widest].mean();
+        let is_beyond = |bin: &Bin| (bin.mean() - mean).dot(&spread.along) > 0.0;
+        let mut sums = [Bin::default(), Bin::default()];
+        let new = self.sums.len();
+        for (group, bin) in self.of_bin.iter_mut().zip(&colours.bins) {
+            if *group == widest {
+                let beyond = is_beyond(bin);
+                sums[usize::from(beyond)].add(bin, 1.0);
+                *group = if beyond { new } else { widest };
+            }
+        }
+        let [near, beyond] = sums;
+        let is_parted = near.count > 0.0 && beyond.count > 0.0;
+        if is_parted {
+            self.sums[widest] = near;
+            self.sums.push(beyond);
+        }
+        is_parted
+    }
+}
+
+/// How far the colours of a group are spread along the direction in which they are most.
+struct Spread {
+    along: Vector3<f64>,
+    /// Sum of the squares along it.
+    sum: f64,
+}
+
+impl Spread {
+    fn of(group: &Bin) -> Self {
+        let eigen = group.covariance().symmetric_eigen();
+        let most = eigen.eigenvalues.imax();
+        Self {
+            along: eigen.eigenvectors.column(most).into_owned(),
+            sum: group.count * eigen.eigenvalues[most],
+        }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::random::generator;
+    use rand::RngExt;
 
     #[test]
     fn colours_speak_for_what_they_were_seen_in() {
@@ -279,7 +312,10 @@ mod tests {
             let noise = Vector3::from_fn(|_, _| random.random_range(-8.0..8.0));
             colours.push(mean + noise);
         }
-        let mixture = Mixture::learned(&colours, 3, &mut random);
+        let learned = |colours: &[Vector3<f64>]| {
+            Mixture::learned(&Colours::counted(colours.iter().copied()), 3)
+        };
+        let mixture = learned(&colours);
         assert_eq!(mixture.parts.len(), 3);
         for (mean, share) in means.iter().zip([0.5, 0.25, 0.25]) {
             let mean = Vector3::from(*mean);
@@ -291,12 +327,8 @@ mod tests {
         }
         let alone = Mixture::of_parts(&mixture.parts[..1]);
         assert!((alone.parts[0].share - 1.0).abs() < 1e-12);
-        assert!(
-            Mixture::learned(&colours[..2], 3, &mut random)
-                .parts
-                .is_empty()
-        );
-        let same = Mixture::learned(&[Vector3::repeat(9.0); 40], 3, &mut random);
+        assert!(learned(&colours[..2]).parts.is_empty());
+        let same = learned(&[Vector3::repeat(9.0); 40]);
         assert!(same.density(&Vector3::repeat(9.0)).is_finite());
     }
 }

@@ -6,10 +6,13 @@
 //! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
 //! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
-//! strokes in place of motion; [`foliage`] finds its leaves.
+//! strokes in place of motion; [`foliage`] finds its leaves, and [`contrast`] says whether a stroke is on
+//! anything.
 
 mod bark;
 mod circles;
+mod colours;
+mod contrast;
 mod crossings;
 mod cut;
 mod evidence;
@@ -23,7 +26,7 @@ mod probability;
 mod steady;
 
 pub use foliage::LeafColour;
-pub use photograph::{Photograph, SeenInPhotograph, in_photograph};
+pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;

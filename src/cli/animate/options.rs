@@ -17,7 +17,8 @@ const MAX_POSES: f64 = 20_000.0;
 
 #[derive(Debug, Args)]
 pub struct AnimateArgs {
-    /// A capture: the folder written by `capture` or `replay --out`.
+    /// A capture: the folder written by `capture` or `replay --out`; or a forest, whose trees sway in
+    /// the same wind.
     pub dir: PathBuf,
     /// Length of the animation, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, value_parser = seconds)]

@@ -5,11 +5,10 @@ use super::picture::ShownPicture;
 use crate::cli::command_error::CommandError;
 use crate::cli::line::of_another_picture;
 use crate::files::read_bounded;
-use crate::import::{ImportError, Sketch, read_strokes};
-use crate::model::TreeStrokes;
+use crate::import::{ImportError, Sketch, Stroke, read_strokes};
+use crate::model::{TreeStrokes, scaled};
 use anyhow::anyhow;
 use clap::Args;
-use nalgebra::Point2;
 use std::path::Path;
 
 /// Largest file of strokes that is read, bytes.
@@ -41,6 +40,8 @@ pub struct StrokeFiles {
 struct StrokeFile {
     name: String,
     sketch: Sketch,
+    /// An SVG drawing has no pixels of its own: it is as large as what it is drawn on.
+    is_svg: bool,
 }
 
 /// The strokes of one tree, px of the picture that is worked on.
@@ -61,6 +62,7 @@ impl StrokeFile {
             false => Ok(Self {
                 name: path.to_owned(),
                 sketch,
+                is_svg: bytes.trim_ascii_start().starts_with(b"<"),
             }),
         }
     }
@@ -73,6 +75,13 @@ impl StrokeFile {
         }
         if self.sketch.size == shown.full_size {
             return Ok(shown.scale());
+        }
+        let [drawn, own] = [self.sketch.size, shown.picture.rgb.size];
+        let scale = f64::from(own.width) / f64::from(drawn.width);
+        // Sides of a page are rounded to pixels.
+        let off_px = f64::from(drawn.height) - f64::from(own.height) / scale;
+        if self.is_svg && off_px.abs() <= 1.0 + 1.0 / scale {
+            return Ok(scale);
         }
         Err(of_another_picture(
             option,
@@ -120,13 +129,26 @@ impl StrokeFiles {
             let crown_px = crown_px
                 .map_err(|e| CommandError::BadUsage(anyhow!("--crown {}: {e}", file.name)))?;
             let scale = file.scale("--crown", shown)?;
-            tree.strokes.crown_px = crown_px.iter().map(|at| at * scale).collect();
+            tree.strokes.crown_px = scaled(&crown_px, scale);
         }
         for file in &self.branches {
             let scale = file.scale("--branch", shown)?;
+            if file.sketch.strokes.is_empty() {
+                return Err(CommandError::BadUsage(anyhow!(
+                    "--branch {}: it holds a crown and no line along a branch; give it to --crown, and a \
+                     line along the trunk here",
+                    file.name
+                )));
+            }
+            if file.sketch.strokes.iter().any(Stroke::is_closed) {
+                return Err(CommandError::BadUsage(anyhow!(
+                    "--branch {}: a line in it is closed, as one round a crown is; draw it along a branch, \
+                     from its base to its tip",
+                    file.name
+                )));
+            }
             for line in file.sketch.lines_px() {
-                let line: Vec<Point2<f64>> = line.iter().map(|at| at * scale).collect();
-                tree.strokes.branches_px.push(line);
+                tree.strokes.branches_px.push(scaled(&line, scale));
             }
         }
         Ok(tree)

@@ -5,14 +5,18 @@ use crate::config;
 use crate::files::{is_named_film, read_bounded};
 use crate::model::{Picture, Size};
 use crate::runtime::{self, FrameError, one_frame};
-use crate::source::Photograph;
+use crate::source::{Photograph, image_format};
 use anyhow::anyhow;
 use clap::Args;
+use std::fs::File;
+use std::io::Read;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Largest photograph that is read, bytes.
 const LARGEST: u64 = 256_000_000;
+/// Bytes by which the format of a picture is known, at most.
+const LONGEST_BEGIN: u64 = 32;
 /// The frame of a camera that is taken where none is named: by then its exposure has settled.
 const SETTLED_FRAME: u64 = 15;
 
@@ -54,9 +58,21 @@ impl PictureArgs {
         let is_there = self.picture.exists();
         let is_film = is_there && (!self.picture.is_file() || is_named_film(&self.picture));
         match is_film || self.frame.is_some() {
+            true if self.is_single_picture() => Err(CommandError::BadUsage(anyhow!(
+                "--frame is for a film, and {} is a single picture; leave --frame out",
+                self.picture.display()
+            ))),
             true => self.read_frame(camera),
             false => self.read_file(),
         }
+    }
+
+    /// Whether it is a file that begins as a picture does.
+    fn is_single_picture(&self) -> bool {
+        let mut begin = Vec::new();
+        let file = File::open(&self.picture);
+        let read = file.and_then(|file| file.take(LONGEST_BEGIN).read_to_end(&mut begin));
+        self.picture.is_file() && read.is_ok() && image_format(&begin).is_some()
     }
 
     fn shown(&self, photo: Photograph, frame: u64, time_s: f64) -> ShownPicture {

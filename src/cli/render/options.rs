@@ -157,14 +157,7 @@ impl RenderArgs {
     ///
     /// # Errors
     /// A message for the user: the option.
-    pub fn check_forest(&self, kind: Kind) -> Result<(), String> {
-        if kind == Kind::Video {
-            return Err(
-                "a forest is drawn as a picture; name one with --out FILE.png, or see it move with \
-                 `arborcam export --format html`"
-                    .into(),
-            );
-        }
+    pub fn check_forest(&self) -> Result<(), String> {
         if self.film.is_some() || self.at.is_some() || self.tree.is_given() {
             return Err(
                 "--film, --at and the options of the tree do not go with a forest; draw one of its \

@@ -22,6 +22,9 @@ const SIZE: Size = Size {
 #[derive(Default)]
 struct Puppet {
     looked: Vec<TreeStrokes>,
+    kept: Vec<TreeStrokes>,
+    /// It takes its time.
+    is_slow: bool,
 }
 
 impl PhotoSession for Puppet {
@@ -36,10 +39,22 @@ impl PhotoSession for Puppet {
         })
     }
 
-    fn look(&mut self, strokes: &TreeStrokes) -> Result<FoundTree, String> {
+    fn look(&mut self, strokes: &TreeStrokes) {
         self.looked.push(strokes.clone());
+    }
+
+    fn keep(&mut self, trees: &[TreeStrokes]) -> Result<String, String> {
+        self.kept = trees.to_vec();
+        Ok("oak-strokes-1.json".into())
+    }
+
+    fn found(&mut self) -> Option<Result<FoundTree, String>> {
+        if self.is_slow {
+            return None;
+        }
+        let strokes = self.looked.last()?;
         if strokes.branches_px.is_empty() {
-            return Err("no tree with a trunk is found".into());
+            return Some(Err("no tree with a trunk is found".into()));
         }
         let nodes = vec![
             WoodNode::made_up(None, 80.0, 85.0),
@@ -47,7 +62,7 @@ impl PhotoSession for Puppet {
             WoodNode::made_up(Some(1), 50.0, 15.0),
             WoodNode::made_up(Some(1), 110.0, 15.0),
         ];
-        Ok(FoundTree {
+        Some(Ok(FoundTree {
             wood: Wood {
                 branches: BranchGraph { nodes },
                 bark: None,
@@ -55,7 +70,7 @@ impl PhotoSession for Puppet {
             },
             in_leaf: false,
             agreement: None,
-        })
+        }))
     }
 }
 
@@ -75,9 +90,15 @@ impl Screen {
             preview: Preview::new(Graphics::characters(Depth::None)),
             terminal: Terminal::new(TestBackend::new(width, height)).expect("terminal"),
         };
-        screen.sheet.look(&mut screen.puppet);
+        screen.look();
         screen.draw();
         screen
+    }
+
+    /// Begins to look, and takes what was found.
+    fn look(&mut self) {
+        self.sheet.look(&mut self.puppet);
+        self.sheet.look(&mut self.puppet);
     }
 
     fn draw(&mut self) {
@@ -90,8 +111,10 @@ impl Screen {
 
     fn event(&mut self, event: &Event) -> Next {
         let next = self.sheet.handle(event, self.preview.placed.as_ref());
-        if next == Next::Look {
-            self.sheet.look(&mut self.puppet);
+        match next {
+            Next::Look => self.look(),
+            Next::Save => self.sheet.save(&mut self.puppet),
+            Next::Stay | Next::Accept | Next::Quit => {}
         }
         self.draw();
         next
@@ -189,11 +212,75 @@ fn a_second_tree_begins_where_the_first_is_whole() {
     screen.stroke('b', &TRUNK);
     screen.press(KeyCode::Char('n'));
     assert!(screen.shown().contains("tree 2"), "{}", screen.shown());
-    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
     screen.stroke('c', &CROWN);
+    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
     screen.stroke('b', &TRUNK);
     assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
     assert_eq!(screen.sheet.accepted().len(), 2);
+}
+
+#[test]
+fn keys_work_while_it_looks_and_what_was_asked_last_counts() {
+    let mut screen = Screen::new(80, 24);
+    screen.puppet.is_slow = true;
+    screen.stroke('c', &CROWN);
+    assert!(screen.shown().contains("Looking… 0."), "{}", screen.shown());
+    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
+    assert!(
+        screen.shown().contains("still looked at"),
+        "{}",
+        screen.shown()
+    );
+    screen.stroke('b', &TRUNK);
+    screen.puppet.is_slow = false;
+    screen.look();
+    let last = screen.puppet.looked.last().expect("looked");
+    assert_eq!((last.crown_px.len(), last.branches_px.len()), (4, 1));
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+}
+
+#[test]
+fn strokes_are_saved_by_a_key() {
+    let mut screen = Screen::new(80, 24);
+    screen.stroke('c', &CROWN);
+    assert_eq!(screen.press(KeyCode::Char('s')), Next::Save);
+    assert_eq!(screen.puppet.kept.len(), 1);
+    assert_eq!(screen.puppet.kept[0].crown_px.len(), 4);
+    assert!(
+        screen.shown().contains("oak-strokes-1.json"),
+        "{}",
+        screen.shown()
+    );
+}
+
+#[test]
+fn escape_leaves_a_line_and_nothing_else() {
+    let mut screen = Screen::new(80, 24);
+    screen.stroke('b', &TRUNK);
+    screen.press(KeyCode::Char('b'));
+    screen.click(TRUNK[0]);
+    screen.press(KeyCode::Char('n'));
+    assert!(
+        screen.shown().contains("Esc leaves it"),
+        "{}",
+        screen.shown()
+    );
+    assert_eq!(screen.press(KeyCode::Esc), Next::Stay);
+    assert!(screen.sheet.state.drawing.is_none());
+    assert_eq!(screen.press(KeyCode::Esc), Next::Stay);
+    assert!(screen.shown().contains("q quits"), "{}", screen.shown());
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    assert_eq!(screen.sheet.accepted()[0].branches_px.len(), 1);
+}
+
+#[test]
+fn a_tree_that_is_only_begun_is_none() {
+    let mut screen = Screen::new(80, 24);
+    screen.stroke('c', &CROWN);
+    screen.stroke('b', &TRUNK);
+    screen.press(KeyCode::Char('n'));
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    assert_eq!(screen.sheet.accepted().len(), 1);
 }
 
 #[test]
