@@ -16,6 +16,7 @@ mod levels;
 mod paths;
 mod radius;
 mod raw_tree;
+mod refine;
 mod register;
 mod thin;
 mod tree;
@@ -101,9 +102,10 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
         return Err(CloudError::Apart { share_percent });
     }
     let base = standing.foot_below(points, &foot);
+    let by_levels = levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell);
     let raw = match options.method {
-        CloudMethod::Paths => levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell),
-        CloudMethod::Colonisation => colonise::colonise(points, base, cell),
+        CloudMethod::Paths => by_levels,
+        CloudMethod::Colonisation => colonise::colonise(&by_levels.contracted(points), base, cell),
     };
     let mut paths = raw.paths();
     let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());
@@ -115,9 +117,13 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
         paths::prune(&mut paths, least);
     }
     reach_tips(&mut paths, points);
-    let noise = radius::measure(&mut paths, &detail);
+    radius::measure(&mut paths, &detail);
     paths::smooth(&mut paths);
-    paths::set_joints(&mut paths);
+    let stretch = f64::from(STRETCH_CELLS * cell);
+    let twig = radius::twig_radius(&paths, radius::noise(&paths), options.twig_radius_m);
+    refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
+    paths::prune(&mut paths, least);
+    let noise = radius::noise(&paths);
     stand_on(&mut paths, base);
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
