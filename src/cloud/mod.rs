@@ -12,6 +12,7 @@ mod foot;
 mod graph;
 mod grid;
 mod ground;
+mod leaves;
 mod levels;
 mod paths;
 mod radius;
@@ -78,6 +79,8 @@ pub struct CloudOptions {
     pub method: CloudMethod,
     /// Radius of the last twigs where it is known, m.
     pub twig_radius_m: Option<f64>,
+    /// Whether the tree bears leaves, which are to be taken off.
+    pub in_leaf: bool,
 }
 
 /// The tree in a cloud.
@@ -91,7 +94,10 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
     let height = standing.height;
-    let (thinned, cell) = thinned(&standing, &mut figures)?;
+    let (mut thinned, cell) = thinned(&standing, &mut figures)?;
+    if options.in_leaf {
+        take_leaves_off(&mut thinned, &standing, cell, &mut figures)?;
+    }
     let points = &thinned.points;
     let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * height);
     let foot = foot::find(&standing.above_ground(points), &graph, height, cell)?;
@@ -275,6 +281,37 @@ fn thinned(standing: &Standing, figures: &mut CloudFigures) -> Result<(Thinned, 
         }
     }
     Ok((thinned, cell))
+}
+
+/// Takes off the points that are no wood.
+fn take_leaves_off(
+    thinned: &mut Thinned,
+    standing: &Standing,
+    cell: f32,
+    figures: &mut CloudFigures,
+) -> Result<(), CloudError> {
+    let points = &thinned.points;
+    let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * standing.height);
+    let foot = foot::find(
+        &standing.above_ground(points),
+        &graph,
+        standing.height,
+        cell,
+    )?;
+    let is_wood = leaves::is_wood(points, &graph, &graph.shortest_ways(&foot), cell);
+    let before = thinned
+        .of_point
+        .iter()
+        .filter(|of| **of != u32::MAX)
+        .count();
+    thinned.without(&is_wood);
+    let after = thinned
+        .of_point
+        .iter()
+        .filter(|of| **of != u32::MAX)
+        .count();
+    figures.leaves = before - after;
+    Ok(())
 }
 
 /// The median distance of points to the third of their neighbours: of a sparse cloud it is more

@@ -38,6 +38,8 @@ pub struct CloudFigures {
     pub ground: usize,
     pub noise: usize,
     pub apart: usize,
+    /// Points of leaves, where they were taken off.
+    pub leaves: usize,
     /// Side of the cells in which points are one, m.
     pub cell_m: f64,
     /// Standard deviation of points off thick wood, m; 0 where there is none.
