@@ -297,7 +297,7 @@ pub(super) fn set_joints(paths: &mut [Path], is_first: bool) {
 }
 
 /// Leads every side path straight from the bark that it leaves to its first circle, with places as
-/// far from each other as `stretch`, m. Radii are to be assigned or measured.
+/// far from each other as `stretch`, m. What it carries stays where it was.
 pub(super) fn lead_from_bark(paths: &mut [Path], stretch: f64) {
     for i in 0..paths.len() {
         let Some(on) = paths[i].on else {
@@ -316,14 +316,11 @@ pub(super) fn lead_from_bark(paths: &mut [Path], stretch: f64) {
         }
         let old = paths[i].places.split_off(first);
         for place in std::mem::replace(&mut paths[i].places, places) {
-            let nearest = paths[i].places.iter_mut().min_by(|a, b| {
-                let off = |p: &Place| (p.at - place.at).norm_squared();
-                off(a).total_cmp(&off(b))
-            });
-            match nearest {
-                Some(nearest) => nearest.points.extend(place.points),
-                None => paths[on.path].places[on.place].points.extend(place.points),
-            }
+            let into = match nearest_place(&paths[i].places, &place.at) {
+                Some(nearest) => &mut paths[i].places[nearest],
+                None => &mut paths[on.path].places[on.place],
+            };
+            into.points.extend(place.points);
         }
         paths[i].places.extend(old);
         // What grows from it does so where it did.
@@ -339,6 +336,12 @@ pub(super) fn lead_from_bark(paths: &mut [Path], stretch: f64) {
             };
         }
     }
+}
+
+fn nearest_place(places: &[Place], at: &Point3<f64>) -> Option<usize> {
+    let squares = places.iter().map(|p| (p.at - at).norm_squared());
+    let nearest = squares.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map(|(place, _)| place)
 }
 
 /// Leads thick wood straight over places without a circle, between those with one.
