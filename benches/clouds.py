@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Trees from point clouds against the true ones.
 
-  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--work DIR] [--method paths|colonisation] [--keep] [options of made_clouds.py]
+  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--work DIR] [--method paths|colonisation] [--in-leaf] [--keep] [options of made_clouds.py]
 
 For each seed: a cloud by made_clouds.py, `arborcam cloud` and `arborcam export --format treefile` on it, and the figures of cloud_score.py:
 
@@ -30,15 +30,18 @@ def main():
     parser.add_argument("last", type=int)
     parser.add_argument("--work", type=Path)
     parser.add_argument("--method", default="paths")
+    parser.add_argument("--in-leaf", action="store_true", help="clouds with leaves, which arborcam takes off")
     parser.add_argument("--keep", action="store_true", help="keep clouds and trees in the folder --work")
     args, of_cloud = parser.parse_known_args()
+    of_cloud += ["--leaves"] if args.in_leaf else []
+    how = ["--method", args.method] + (["--in-leaf"] if args.in_leaf else [])
     work = args.work or Path(tempfile.mkdtemp(prefix="clouds-"))
     rows, failed = [], []
     for seed in range(args.first, args.last + 1):
         folder = work / str(seed)
         if not (folder / "truth.json").exists():
             subprocess.run([sys.executable, HERE / "made_clouds.py", work, str(seed), str(seed), *of_cloud], check=True)
-        row = run(args.arborcam, folder, args.method)
+        row = run(args.arborcam, folder, how)
         if row is None:
             failed.append(seed)
         else:
@@ -52,11 +55,11 @@ def main():
         print(f"{key:9} mean of sizes {values.mean():.3f}  worst {values.max():.3f}  least {values.min():.3f}")
 
 
-def run(arborcam, folder, method):
-    tree, treefile = folder / f"tree-{method}", folder / f"tree-{method}.txt"
+def run(arborcam, folder, how):
+    tree, treefile = folder / f"tree-{how[1]}", folder / f"tree-{how[1]}.txt"
     shutil.rmtree(tree, ignore_errors=True)
     treefile.unlink(missing_ok=True)
-    child = subprocess.Popen([arborcam, "cloud", folder / "cloud.ply", "--out", tree, "--method", method], stderr=subprocess.PIPE)
+    child = subprocess.Popen([arborcam, "cloud", folder / "cloud.ply", "--out", tree, *how], stderr=subprocess.PIPE)
     said = child.stderr.read().decode()
     _, status, used = os.wait4(child.pid, 0)
     if status:

@@ -8,6 +8,7 @@ with the same seed, so that a film can be laid on the scan.
 
 Writes to OUT_DIR/NAME:
   cloud.ply (or cloud.xyz)   points, m, z up, turned and shifted by chance as surveys are
+  owner.npy                  of each point the number of its branch, -1 on a leaf, -2 on the ground
   truth.json                 of each branch parent, centre line (m, in the cloud's axes), radius at each of its places, points on
                              it, Hz, damping; the foot; how the film's axes lie in those of the cloud
 
@@ -64,6 +65,7 @@ def make(folder, args):
     folder.mkdir(parents=True, exist_ok=True)
     order = rng.permutation(len(points))
     write(folder / f"cloud.{args.format}", points[order], args.format)
+    np.save(folder / "owner.npy", owner[order].astype(np.int16))
     truth = dict(seed=args.seed, leaves=args.leaves, noise_m=noise_m, scanners=scanners, points=len(points),
                  foot=shift.tolist(), turn=turn.tolist(), branches=[
                      dict(id=b.id, parent=b.parent, depth=b.depth, points=int((owner == b.id).sum()),

@@ -130,18 +130,17 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
         .map(NodeId)
         .filter(|n| tree.skeleton.children()[n.index()].is_empty());
     let tips: Vec<Point3<f64>> = tips.map(|n| nodes[n.index()].position * metres).collect();
-    // Noise may make a twig of some centimetres.
-    assert!(
-        (TUBES.len()..=TUBES.len() + 2).contains(&tips.len()),
-        "{tips:?}"
-    );
+    // A stub stays at a fork of thick limbs in two of twelve such clouds.
+    let counts = TUBES.len()..=TUBES.len() + 1;
+    assert!(counts.contains(&tips.len()), "{tips:?}");
     for (_, end, _, _) in TUBES {
         let end = Point3::new(end[0], end[2], -end[1]);
         let off = tips
             .iter()
             .map(|t| (t - end).norm())
             .fold(f64::INFINITY, f64::min);
-        assert!(off < 0.08, "{end}: {off}");
+        // The trunk ends as an open ring of 5 cm radius, and its tip anywhere on that.
+        assert!(off < 0.07, "{end}: {off}");
     }
     let breast = nodes
         .iter()
@@ -149,14 +148,14 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
         .min_by_key(|n| ((n.position.y * metres - 1.3).abs() * 1e6) as u64);
     let radius = breast.expect("a node").radius * metres;
     assert!((radius - 0.124).abs() < 0.006, "{radius}");
-    // Each limb parts at a fork.
+    // Each limb leaves at a fork of its own.
     let forks = tree
         .skeleton
         .children()
         .iter()
         .filter(|c| c.len() == 2)
         .count();
-    assert!((4..=6).contains(&forks), "{forks}");
+    assert!((TUBES.len() - 1..=TUBES.len()).contains(&forks), "{forks}");
     // The same again, byte for byte; and the other method.
     let again = dir.path().join("again");
     done(&["cloud", name], &again);
@@ -253,7 +252,7 @@ fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
         .iter()
         .fold((0.0, 0.0), |sum, tube| (sum.0 + tube.0, sum.1 + tube.1));
     assert!(
-        (length / sums.0 - 1.0).abs() < 0.04,
+        (length / sums.0 - 1.0).abs() < 0.03,
         "{length} m of {}",
         sums.0
     );

@@ -42,6 +42,9 @@ pub struct CloudArgs {
     /// Radius of the last twigs, mm, where it was measured.
     #[arg(long, value_name = "MM", value_parser = twig_radius)]
     twig_radius_mm: Option<f64>,
+    /// The tree was scanned in leaf: take the leaves off first.
+    #[arg(long)]
+    in_leaf: bool,
     /// A capture of the same tree: its frequencies and damping are put on the scanned branches.
     /// From where it was filmed is found by itself, or by --pairs.
     #[arg(long, value_name = "DIR")]
@@ -129,6 +132,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let options = CloudOptions {
         method: args.method.into(),
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
+        in_leaf: args.in_leaf,
     };
     let tree = tree_of_cloud(&cloud, options).map_err(|e| of_file(e.into()))?;
     let scaled = stand_scanned(&tree);
@@ -270,8 +274,13 @@ fn read(path: &Path, unit_m: Option<f64>) -> Result<CloudRead, CommandError> {
 fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
     let figures = tree.figures;
     let share = |points: usize| 100.0 * points as f64 / figures.points.max(1) as f64;
+    let leaves = match figures.leaves {
+        0 => String::new(),
+        leaves => format!(", {:.0} % leaves", share(leaves)),
+    };
     eprint_line(&format!(
-        "{}: a tree of {branches} branches, {:.2} m high; of {} points {:.0} % are ground and {:.1} % noise",
+        "{}: a tree of {branches} branches, {:.2} m high; of {} points {:.0} % are ground{leaves} \
+         and {:.1} % noise",
         out.display(),
         figures.height_m,
         figures.points,

@@ -32,6 +32,23 @@ pub(super) struct Ways {
     pub before: Vec<u32>,
 }
 
+impl Ways {
+    /// How many points' ways lead over each point, its own one not counted.
+    pub fn points_above(&self) -> Vec<u32> {
+        let mut order: Vec<u32> = (0..self.length.len() as u32).collect();
+        order
+            .sort_unstable_by(|a, b| self.length[*b as usize].total_cmp(&self.length[*a as usize]));
+        let mut above = vec![0; self.length.len()];
+        for point in order {
+            let before = self.before[point as usize];
+            if before != point {
+                above[before as usize] += above[point as usize] + 1;
+            }
+        }
+        above
+    }
+}
+
 impl Graph {
     /// Joins all points nearer to each other than `reach`; gaps of up to `widest` between what
     /// hangs together are bridged at their narrowest, the narrowest first (Boruvka's tree of

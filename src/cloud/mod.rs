@@ -12,10 +12,12 @@ mod foot;
 mod graph;
 mod grid;
 mod ground;
+mod leaves;
 mod levels;
 mod paths;
 mod radius;
 mod raw_tree;
+mod refine;
 mod register;
 mod thin;
 mod tree;
@@ -77,6 +79,8 @@ pub struct CloudOptions {
     pub method: CloudMethod,
     /// Radius of the last twigs where it is known, m.
     pub twig_radius_m: Option<f64>,
+    /// Whether the tree bears leaves, which are to be taken off.
+    pub in_leaf: bool,
 }
 
 /// The tree in a cloud.
@@ -90,7 +94,10 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
     let height = standing.height;
-    let (thinned, cell) = thinned(&standing, &mut figures)?;
+    let (mut thinned, cell) = thinned(&standing, &mut figures)?;
+    if options.in_leaf {
+        take_leaves_off(&mut thinned, &standing, cell, &mut figures)?;
+    }
     let points = &thinned.points;
     let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * height);
     let foot = foot::find(&standing.above_ground(points), &graph, height, cell)?;
@@ -101,9 +108,10 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
         return Err(CloudError::Apart { share_percent });
     }
     let base = standing.foot_below(points, &foot);
+    let by_levels = levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell);
     let raw = match options.method {
-        CloudMethod::Paths => levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell),
-        CloudMethod::Colonisation => colonise::colonise(points, base, cell),
+        CloudMethod::Paths => by_levels,
+        CloudMethod::Colonisation => colonise::colonise(&by_levels.contracted(points), base, cell),
     };
     let mut paths = raw.paths();
     let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());
@@ -115,9 +123,13 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
         paths::prune(&mut paths, least);
     }
     reach_tips(&mut paths, points);
-    let noise = radius::measure(&mut paths, &detail);
+    radius::measure(&mut paths, &detail);
     paths::smooth(&mut paths);
-    paths::set_joints(&mut paths);
+    let stretch = f64::from(STRETCH_CELLS * cell);
+    let twig = radius::twig_radius(&paths, radius::noise(&paths), options.twig_radius_m);
+    refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
+    paths::prune(&mut paths, least);
+    let noise = radius::noise(&paths);
     stand_on(&mut paths, base);
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
@@ -269,6 +281,37 @@ fn thinned(standing: &Standing, figures: &mut CloudFigures) -> Result<(Thinned, 
         }
     }
     Ok((thinned, cell))
+}
+
+/// Takes off the points that are no wood.
+fn take_leaves_off(
+    thinned: &mut Thinned,
+    standing: &Standing,
+    cell: f32,
+    figures: &mut CloudFigures,
+) -> Result<(), CloudError> {
+    let points = &thinned.points;
+    let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * standing.height);
+    let foot = foot::find(
+        &standing.above_ground(points),
+        &graph,
+        standing.height,
+        cell,
+    )?;
+    let is_wood = leaves::is_wood(points, &graph, &graph.shortest_ways(&foot), cell);
+    let before = thinned
+        .of_point
+        .iter()
+        .filter(|of| **of != u32::MAX)
+        .count();
+    thinned.without(&is_wood);
+    let after = thinned
+        .of_point
+        .iter()
+        .filter(|of| **of != u32::MAX)
+        .count();
+    figures.leaves = before - after;
+    Ok(())
 }
 
 /// The median distance of points to the third of their neighbours: of a sparse cloud it is more

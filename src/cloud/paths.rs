@@ -6,6 +6,15 @@ use nalgebra::{Point3, Vector3};
 const DIRECTION_REACH: usize = 3;
 /// Places that a side path's first direction is taken from.
 const DEPARTURE_PLACES: usize = 6;
+/// The same in its radii.
+const DEPARTURE_RADII: f64 = 2.0;
+/// A side path leaves no farther below the place where barks part than they are away there, times
+/// this: branches stand off by 15 degrees and more.
+const FARTHEST_BACK: f64 = 4.0;
+/// A direction is unsure by about this, radians: lines that meet as well as that sooner do.
+const UNSURE_DIRECTION: f64 = 0.15;
+/// Places without a circle are passed over between circles so many radii apart.
+const WIDEST_GAP_RADII: f64 = 4.0;
 /// Rounds in which a path is smoothed by the weights 1, 2, 1.
 const SMOOTHINGS: usize = 2;
 /// A side path is kept if its tip stands out of the wood that it leaves by more than this share of
@@ -96,6 +105,30 @@ impl Path {
             .windows(2)
             .map(|p| (p[1].at - p[0].at).norm())
             .sum()
+    }
+
+    /// The first place with a circle, if it is near the base; else the base.
+    fn first_circle(&self) -> usize {
+        let has_circle = |p: &Place| p.measured.is_some_and(|m| m.is_circle);
+        let first = self.places.iter().position(has_circle).unwrap_or(0);
+        let way = (self.places[first].at - self.places[0].at).norm();
+        if way <= WIDEST_GAP_RADII * radius_near(self, first) {
+            first
+        } else {
+            0
+        }
+    }
+
+    /// The stretch that a side path's first direction is taken from: from where it is free of what
+    /// it leaves, as long as it is thick, and some places at least.
+    fn first_stretch(&self) -> (Point3<f64>, Point3<f64>) {
+        let first = self.first_circle();
+        let begin = self.places[first].at;
+        let radius = radius_near(self, first);
+        let is_far = |p: &Place| (p.at - begin).norm() > DEPARTURE_RADII * radius;
+        let far = self.places[first..].iter().position(is_far).unwrap_or(0);
+        let last = first + far.max(DEPARTURE_PLACES - 1);
+        (begin, self.places[last.min(self.places.len() - 1)].at)
     }
 
     /// Distance of a point from its line.
@@ -231,30 +264,97 @@ pub(super) fn smooth(paths: &mut [Path]) {
 }
 
 /// Lets every side path leave where its own line meets that of its parent: the level sets of a fork
-/// part only where the barks do.
-pub(super) fn set_joints(paths: &mut [Path]) {
+/// part only where the barks do. Up to there the parent is led straight if `is_first`.
+pub(super) fn set_joints(paths: &mut [Path], is_first: bool) {
     for i in 0..paths.len() {
         let Some(on) = paths[i].on else {
             continue;
         };
-        let own = &paths[i].places;
-        let last = (DEPARTURE_PLACES - 1).min(own.len() - 1);
-        let Some(along) = (own[last].at - own[0].at).try_normalize(1e-9) else {
+        let own = &paths[i];
+        let (begin, end) = own.first_stretch();
+        let Some(along) = (end - begin).try_normalize(1e-9) else {
             continue;
         };
         let parent = &paths[on.path];
-        // Not farther back than the bark is away, twice.
-        let most = 2.0 * (own[0].at - parent.places[on.place].at).norm();
-        let near = (0..parent.places.len())
-            .filter(|k| (parent.places[*k].at - parent.places[on.place].at).norm() <= most);
+        let joint = parent.places[on.place].at;
+        // Not farther back than the bark is away, some times.
+        let most = FARTHEST_BACK * (begin - joint).norm();
+        let near =
+            (0..parent.places.len()).filter(|k| (parent.places[*k].at - joint).norm() <= most);
         let off = |k: usize| {
-            let way = parent.places[k].at - own[0].at;
+            let way = parent.places[k].at - begin;
             // Behind the first place, as the line goes on backwards.
-            (way - along * way.dot(&along).min(0.0)).norm()
+            let back = way.dot(&along).min(0.0);
+            (way - along * back).norm() - UNSURE_DIRECTION * back
         };
         let best = near.min_by(|a, b| off(*a).total_cmp(&off(*b)));
         let place = best.unwrap_or(on.place);
         paths[i].on = Some(Joint { place, ..on });
-        paths[on.path].straighten(place, on.place + 1);
+        if is_first {
+            paths[on.path].straighten(place, on.place + 1);
+        }
+    }
+}
+
+/// Leads every side path straight from the bark that it leaves to its first circle, with places as
+/// far from each other as `stretch`, m. What it carries stays where it was.
+pub(super) fn lead_from_bark(paths: &mut [Path], stretch: f64) {
+    for i in 0..paths.len() {
+        let Some(on) = paths[i].on else {
+            continue;
+        };
+        let joint = paths[on.path].places[on.place].at;
+        let bark = radius_near(&paths[on.path], on.place);
+        let first = paths[i].first_circle();
+        let way = paths[i].places[first].at - joint;
+        let free = way.norm() - bark;
+        let count = (free / stretch) as usize;
+        let mut places: Vec<Place> = Vec::new();
+        for k in 0..count {
+            let far = bark + free * k as f64 / count as f64;
+            places.push(Place::new(joint + way * (far / way.norm())));
+        }
+        let old = paths[i].places.split_off(first);
+        for place in std::mem::replace(&mut paths[i].places, places) {
+            let into = match nearest_place(&paths[i].places, &place.at) {
+                Some(nearest) => &mut paths[i].places[nearest],
+                None => &mut paths[on.path].places[on.place],
+            };
+            into.points.extend(place.points);
+        }
+        paths[i].places.extend(old);
+        // What grows from it does so where it did.
+        for on in paths
+            .iter_mut()
+            .filter_map(|p| p.on.as_mut())
+            .filter(|on| on.path == i)
+        {
+            let share = count as f64 / first.max(1) as f64;
+            on.place = match on.place.checked_sub(first) {
+                Some(after) => count + after,
+                None => (on.place as f64 * share) as usize,
+            };
+        }
+    }
+}
+
+fn nearest_place(places: &[Place], at: &Point3<f64>) -> Option<usize> {
+    let squares = places.iter().map(|p| (p.at - at).norm_squared());
+    let nearest = squares.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+    nearest.map(|(place, _)| place)
+}
+
+/// Leads thick wood straight over places without a circle, between those with one.
+pub(super) fn bridge_gaps(paths: &mut [Path]) {
+    for path in paths {
+        let circles: Vec<usize> = (0..path.places.len())
+            .filter(|k| path.places[*k].measured.is_some_and(|m| m.is_circle))
+            .collect();
+        for ends in circles.windows(2) {
+            let way = path.places[ends[1]].at - path.places[ends[0]].at;
+            if way.norm() <= WIDEST_GAP_RADII * path.places[ends[0]].radius {
+                path.straighten(ends[0], ends[1]);
+            }
+        }
     }
 }

@@ -85,8 +85,7 @@ impl<'a> Detail<'a> {
 }
 
 /// Measures the radius of every place, and moves the places to the middles of their circles.
-/// Returns the standard deviation of the points off the wood, m.
-pub(super) fn measure(paths: &mut [Path], detail: &Detail) -> f64 {
+pub(super) fn measure(paths: &mut [Path], detail: &Detail) {
     for path in paths.iter_mut() {
         let all = 0..path.places.len();
         let across: Vec<Across> = all.map(|k| Across::of(path, k, detail)).collect();
@@ -103,15 +102,7 @@ pub(super) fn measure(paths: &mut [Path], detail: &Detail) -> f64 {
             }
         }
     }
-    let circles = paths
-        .iter()
-        .flat_map(|p| &p.places)
-        .filter_map(|p| p.measured);
-    let spreads: Vec<f64> = circles
-        .filter(|m| m.radius >= THICK_M)
-        .map(|m| m.spread)
-        .collect();
-    let noise = median(spreads, f64::total_cmp).unwrap_or(0.0);
+    let noise = noise(paths);
     for path in paths.iter_mut() {
         for k in 0..path.places.len() {
             if path.places[k].measured.is_none_or(|m| m.radius < THICK_M) {
@@ -119,7 +110,19 @@ pub(super) fn measure(paths: &mut [Path], detail: &Detail) -> f64 {
             }
         }
     }
-    noise
+}
+
+/// The standard deviation of points off thick wood, m; 0 where no circle shows it.
+pub(super) fn noise(paths: &[Path]) -> f64 {
+    let circles = paths
+        .iter()
+        .flat_map(|p| &p.places)
+        .filter_map(|p| p.measured);
+    let spreads: Vec<f64> = circles
+        .filter(|m| m.is_circle && m.radius >= THICK_M)
+        .map(|m| m.spread)
+        .collect();
+    median(spreads, f64::total_cmp).unwrap_or(0.0)
 }
 
 /// The points of a place, seen along the wood.

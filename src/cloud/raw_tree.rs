@@ -21,6 +21,17 @@ pub(super) struct RawNode {
 }
 
 impl RawTree {
+    /// The points drawn together to the middle of the wood: each at the node that it belongs to, or
+    /// where it is if it is of none.
+    pub fn contracted(&self, points: &[Point3<f32>]) -> Vec<Point3<f32>> {
+        let nodes = points.iter().zip(&self.of_point);
+        let middle = nodes.map(|(at, of)| match self.nodes.get(*of as usize) {
+            Some(node) => node.at.cast(),
+            None => *at,
+        });
+        middle.collect()
+    }
+
     /// The tree as paths, each from where it leaves another one to its tip: at every fork the path
     /// goes on in the child that carries the greatest length of wood.
     pub fn paths(&self) -> Vec<Path> {

@@ -7,6 +7,9 @@ use nalgebra::Point3;
 const STRAIGHT_CELLS: f64 = 0.5;
 /// Between two nodes the radius of the wood is off by at most this share of it.
 const RADIUS_SHARE: f64 = 0.08;
+/// From node to node the radius falls by no more than this share, where there are places between:
+/// tables give each piece as a cylinder with the radius of its end.
+const LARGEST_STEP: f64 = 0.04;
 
 /// A tree in space.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +41,8 @@ pub struct CloudFigures {
     pub ground: usize,
     pub noise: usize,
     pub apart: usize,
+    /// Points of leaves, where they were taken off.
+    pub leaves: usize,
     /// Side of the cells in which points are one, m.
     pub cell_m: f64,
     /// Standard deviation of points off thick wood, m; 0 where there is none.
@@ -104,13 +109,20 @@ fn kept_places(paths: &[Path], tolerance: f64) -> Vec<Vec<bool>> {
         let fixed: Vec<usize> = (0..=last).filter(|k| keep[*k]).collect();
         let mut stretches: Vec<[usize; 2]> = fixed.windows(2).map(|w| [w[0], w[1]]).collect();
         while let Some([from, to]) = stretches.pop() {
-            if let Some(off) = farthest_off(path, from, to, tolerance) {
+            let off = farthest_off(path, from, to, tolerance);
+            if let Some(off) = off.or_else(|| halfway(path, from, to)) {
                 keep[off] = true;
                 stretches.extend([[from, off], [off, to]]);
             }
         }
     }
     kept
+}
+
+/// The place halfway between two others whose radii are too unlike for one cylinder.
+fn halfway(path: &Path, from: usize, to: usize) -> Option<usize> {
+    let falls = path.places[to].radius < (1.0 - LARGEST_STEP) * path.places[from].radius;
+    (falls && to - from > 1).then_some((from + to) / 2)
 }
 
 /// The place between two others that is farthest off the straight cone between them, if that is too

@@ -98,6 +98,9 @@ pub struct ScanNote {
     pub ground_points: u64,
     pub noise_points: u64,
     pub apart_points: u64,
+    /// Points of leaves, where they were taken off.
+    #[serde(default)]
+    pub leaf_points: u64,
     /// Side of the cells in which points were taken for one, m.
     pub cell_m: f64,
     /// Standard deviation of the points off thick wood, m; 0 where there is none.

@@ -103,6 +103,7 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         points: figures.points as u64,
         ground_points: figures.ground as u64,
         noise_points: figures.noise as u64,
+        leaf_points: figures.leaves as u64,
         apart_points: figures.apart as u64,
         cell_m: figures.cell_m,
         noise_m: figures.noise_m,
