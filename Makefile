@@ -61,7 +61,7 @@ SYSTEM ?= /usr/lib
 BINARY ?= target/release/arborcam
 put = install -D -m
 with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
-DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/dynamics.md docs/sweep.md docs/viewer.md docs/gallery.md docs/animate.md docs/analyze.md docs/grow.md docs/forest.md docs/sketch.md docs/photo.md docs/markers.md docs/clouds.md
+DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/dynamics.md docs/sweep.md docs/viewer.md docs/gallery.md docs/animate.md docs/analyze.md docs/grow.md docs/forest.md docs/sketch.md docs/photo.md docs/markers.md docs/depth.md docs/clouds.md
 INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
 	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
 	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \

@@ -17,6 +17,8 @@ Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
   wood_mean.png, leaves_mean.png   of a film in wind, in which the tree is never at rest: the same in its mean pose
   truth_markers.json, markers.json   with --markers: coloured discs on the branches, a board hides one of them for a second; where
                  each is in every frame; the windows and parents that a user would give
+  rgb.txt, depth.txt, rgb/, depth/, camera.json   with --depth: the film as a depth camera gives it, in place of video.mkv; a pinhole
+                 2 m before the tree, real metres (see made_films/depth.py)
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
@@ -37,7 +39,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from made_films import bad_input, markers, motion, picture, scenery, surface, tree, truth
+from made_films import bad_input, depth, markers, motion, picture, scenery, surface, tree, truth
 
 DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
@@ -54,18 +56,20 @@ def main():
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
     parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
+    parser.add_argument("--depth", action="store_true", help="a depth camera films it, in real metres")
     args = parser.parse_args()
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
-    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers)
+    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers, args.depth)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
     theta_rad = bad.sways(theta_rad)
     pose = motion.Pose(branches, theta_rad)
     camera = picture.Camera.framing(rng, pose.points_m)
+    camera = depth.Pinhole.like(camera) if has_depth else camera
     skin = bad.more_leaves(seed, branches, pose, surface.cover(rng, branches, pose, leafy))
     background = scenery.scenery(rng, leafy, picture.WIDTH, picture.HEIGHT)
     bad.set_up(seed, background, skin, camera, frames)
@@ -96,7 +100,8 @@ def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0):
                 branches=truth.of_branches(branches, pose, camera, branch, facts))
 
     folder.mkdir(parents=True, exist_ok=True)
-    picture.film(folder / "video.mkv", rng, background, skin, pose, camera, frames, bad)
+    out = depth.DepthFilm(folder, seed, camera) if has_depth else None
+    picture.film(folder / "video.mkv", rng, background, skin, pose, camera, frames, bad, out)
     for name, mask in pictures.items():
         cv2.imwrite(str(folder / name), mask)
     np.savez_compressed(folder / "grid.npz", pix0=pix0, branch=branch, pos_2d=pos_2d)

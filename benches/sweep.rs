@@ -37,7 +37,7 @@ fn gathered(
     config.detect.points = points;
     // More points find room only if they may stand closer.
     config.detect.min_distance_px *= (400.0 / f64::from(points)).sqrt().min(1.0);
-    let mut source = source::open(clip, &config.camera, None).expect("clip");
+    let mut source = source::open(clip, &config, None).expect("clip");
     let given = arborcam::outline::load(outline, source.describe().size).expect("outline");
     let Given::Region(outline) = given else {
         panic!("the sweep takes a polygon or a mask, no scribbles")

@@ -3,7 +3,7 @@
 //! `leaves.png`, `rest.png` and `branches.csv` to OUT.
 
 use arborcam::cancel::CancelToken;
-use arborcam::config::{self, Config};
+use arborcam::config::Config;
 use arborcam::document::at_rest_files;
 use arborcam::model::{Outline, TimedFrame};
 use arborcam::outline::{self, Given};
@@ -31,7 +31,7 @@ fn main() {
 fn look(clip: &Path, out: &Path) {
     let config = Config::default();
     let mut film =
-        source::open(&clip.join("video.mkv"), &config::Camera::default(), None).expect("video.mkv");
+        source::open(&clip.join("video.mkv"), &Config::default(), None).expect("video.mkv");
     let mut outline: Option<Outline> = None;
     let mut pipeline: Option<Pipeline> = None;
     let mut log = FilmLog::new(config.accumulate.window_s);

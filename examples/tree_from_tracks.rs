@@ -127,6 +127,7 @@ fn tracks(points: &[PlantPoint], branches: &[Branch], frame: u64) -> TrackSet {
             fb_error_px: 0.05,
             error_px: None,
             confirmed: true,
+            depth: None,
         });
     }
     TrackSet {

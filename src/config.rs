@@ -18,9 +18,9 @@ pub use reference::{default_file, help, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};
 pub use settings::{
-    Accumulate, Affinity, Backend, Camera, CameraFormat, Config, Detect, Dynamics, EnvelopeKind,
-    Excited, Export, Hierarchy, Leader, LeafShow, Leaves, MarkerMethod, Markers, Motion,
-    MotionMethod, Outline, SECTIONS, Shape, Skeleton, Tag, TraceBy, Track, Wind, Wood,
+    Accumulate, Affinity, Backend, Camera, CameraFormat, Config, Depth, Detect, Dynamics,
+    EnvelopeKind, Excited, Export, Hierarchy, Leader, LeafShow, Leaves, MarkerMethod, Markers,
+    Motion, MotionMethod, Outline, SECTIONS, Shape, Skeleton, Tag, TraceBy, Track, Wind, Wood,
 };
 
 use std::time::Duration;

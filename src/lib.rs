@@ -57,6 +57,7 @@ pub mod caught;
 pub mod cli;
 pub mod cloud;
 pub mod config;
+pub mod depth;
 #[cfg(feature = "terminal")]
 pub mod doctor;
 pub mod document;

@@ -14,6 +14,7 @@ mod least_wood;
 mod lift;
 mod model;
 mod refine;
+mod seen_depth;
 mod sub_branches;
 mod taper;
 
@@ -31,6 +32,7 @@ use at_rest::at_rest;
 use clear::Turns;
 use nalgebra::Point2;
 use refine::Refinement;
+use seen_depth::{DepthSource, node_depths, rest_depths};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
@@ -58,7 +60,11 @@ pub fn solve(
         let refinement = Refinement::of(log, prior, config)?;
         let evidence = refinement.evidence()?;
         let (table, moment) = (&refinement.table, refinement.moment);
-        let new = build(table, evidence, Stand::of(prior), config, moment)?;
+        let depths = DepthSource {
+            window: log.last(config.accumulate.window_s),
+            prior: prior.depths.as_deref(),
+        };
+        let new = build(table, evidence, Stand::of(prior), depths, config, moment)?;
         let new = without_doubtful(new, log, &prior.left_out, config);
         return refinement.better(new, cancel);
     }
@@ -72,7 +78,11 @@ pub fn solve(
         ..Moment::of(window)?
     };
     let stand = Stand::find(outline, log, &table, &evidence.moving, config);
-    let mut model = build(&table, evidence, stand, config, moment)?;
+    let depths = DepthSource {
+        window,
+        prior: None,
+    };
+    let mut model = build(&table, evidence, stand, depths, config, moment)?;
     let before = model.skeleton.clone();
     model.assemble(&before, config);
     Some(without_doubtful(model, log, &BTreeSet::new(), config))
@@ -208,6 +218,7 @@ fn build(
     table: &Arc<TrackTable>,
     evidence: Evidence,
     stand: Stand,
+    depths: DepthSource,
     config: &Config,
     moment: Moment,
 ) -> Option<Model> {
@@ -219,11 +230,17 @@ fn build(
     if hierarchy.members().len() < LEAST_MOVING {
         return None;
     }
-    let skeleton = Arc::new(lift_to_3d(&hierarchy, foot_px, &stand.at_rest, config));
     let mut rest_px = BTreeMap::new();
     for (row, id) in table.ids.iter().enumerate() {
         rest_px.insert(*id, hierarchy::rest_position_px(table, row));
     }
+    let depths = rest_depths(depths, &hierarchy, &rest_px, foot_px, &config.depth);
+    let (flat, _) = lift::flat(&hierarchy, foot_px, config);
+    let seen = depths.as_ref().map_or(Vec::new(), |depths| {
+        node_depths(&flat, &hierarchy, &rest_px, depths)
+    });
+    let skeleton = lift_to_3d(&hierarchy, foot_px, &stand.at_rest, &seen, config);
+    let skeleton = Arc::new(skeleton);
     let first = First {
         frame: moment.frame,
         time_s: moment.time_s,
@@ -233,6 +250,8 @@ fn build(
     };
     Some(Model {
         rest_px,
+        depths,
+        seen,
         hierarchy,
         table: table.clone(),
         first,

@@ -17,8 +17,17 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // A recording is a source, read where its format is known.
     (
         "source",
-        &["model", "config", "recording", "caught", "ffmpeg"],
+        &[
+            "model",
+            "config",
+            "recording",
+            "caught",
+            "ffmpeg",
+            // The colour camera that the user gives.
+            "depth",
+        ],
     ),
+    ("depth", &["model", "config", "signal"]),
     ("outline", &["model", "config", "signal"]),
     ("track", &["model", "config", "signal"]),
     ("markers", &["model", "config"]),
@@ -58,6 +67,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            "depth",
             "hierarchy",
             "skeleton",
             "shape",
@@ -74,6 +84,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             // The first of its stages makes pictures of bytes, the last analyses the sway.
             "source::Decoder",
             "source::DecodeError",
+            "depth",
             "dynamics",
             "outline",
             "track",
@@ -175,6 +186,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
         &[
             "model",
             "config",
+            // What the run knows of the film's depth.
+            "depth",
             "caught",
             "source",
             "outline",

@@ -3,6 +3,9 @@
 
 #[path = "support/chance.rs"]
 mod chance;
+#[path = "support/ros.rs"]
+#[allow(dead_code)] // faults are for other tests
+mod ros;
 
 use arborcam::cloud::{CloudOptions, tree_of_cloud};
 use arborcam::config::Config;
@@ -80,6 +83,7 @@ fn written_now() -> Vec<u8> {
             size,
             format,
             bytes,
+            depth: None,
         };
         series.frame(&raw, n as u64).expect("frame");
         if n % 3 == 2 {
@@ -94,7 +98,8 @@ fn written_now() -> Vec<u8> {
 fn no_recording_brings_the_reader_down() {
     let now = written_now();
     let mut read = Vec::new();
-    for seed in seeds("recording").into_iter().chain([now]) {
+    let of_ros = [false, true].map(|is_ros2| ros::film(is_ros2, 4, ros::Faults::default()));
+    for seed in seeds("recording").into_iter().chain([now]).chain(of_ros) {
         each(&seed, |bytes| {
             let Ok(mut reader) = Reader::new(Path::new("seed.mcap"), Cursor::new(bytes)) else {
                 return;

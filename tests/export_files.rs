@@ -9,10 +9,9 @@ use arborcam::document::note::{ModelNote, Quality, json};
 use arborcam::document::{CaptureNote, MotionCsv, SCHEMA_VERSION, TracksCsv, nodes};
 use arborcam::files::{OutputFolder, WriteError};
 use arborcam::model::{
-    Excitation, Gap, Interval, MAX_GAPS, NodeId, NodeName, Observation, Sway, Timing, TrackId,
-    TrackSet, Unidentified,
+    DepthSeen, Excitation, Gap, Interval, MAX_GAPS, NodeId, NodeName, Observation, Sway, Timing,
+    TrackId, TrackSet, Unidentified,
 };
-use nalgebra::Point2;
 use small_disk::SmallDisk;
 use std::collections::HashMap;
 use std::fs;
@@ -24,7 +23,7 @@ fn text(bytes: Vec<u8>) -> String {
 
 #[test]
 fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
-    let mut csv = TracksCsv::new(Vec::new()).unwrap();
+    let mut csv = TracksCsv::new(Vec::new(), false).unwrap();
     let o = |id, u_px| Observation {
         id: TrackId(id),
         u_px,
@@ -32,6 +31,7 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
         fb_error_px: 0.1,
         error_px: None,
         confirmed: true,
+        depth: None,
     };
     let set = TrackSet {
         frame: 3,
@@ -41,9 +41,30 @@ fn tracks_have_the_agreed_columns_and_an_empty_cell_where_no_node_is() {
     };
     csv.set(&set, |id| (id == TrackId(1)).then_some(NodeName(5)))
         .unwrap();
-    csv.row(TrackId(9), 4, 1.0 / 3.0, Point2::new(f64::NAN, -0.0), None)
-        .unwrap();
+    let later = TrackSet {
+        frame: 4,
+        time_s: 1.0 / 3.0,
+        ..TrackSet::default()
+    };
+    let nowhere = Observation {
+        v_px: -0.0,
+        ..o(9, f32::NAN)
+    };
+    csv.row(&later, &nowhere, None).unwrap();
     let expected = "track_id,frame,time_s,u_px,v_px,node_id\n1,3,0.1,10.25,7,5\n2,3,0.1,0,7,\n9,4,0.333333,,0,\n";
+    assert_eq!(text(csv.finish().unwrap()), expected);
+    let mut csv = TracksCsv::new(Vec::new(), true).unwrap();
+    let seen = Observation {
+        depth: Some(DepthSeen {
+            depth_m: 2.5,
+            sd_m: 0.0125,
+        }),
+        ..o(1, 10.25)
+    };
+    csv.row(&set, &seen, Some(NodeName(5))).unwrap();
+    csv.row(&set, &o(2, 0.0), None).unwrap();
+    let expected = "track_id,frame,time_s,u_px,v_px,node_id,depth_m,depth_sd_m\n\
+                    1,3,0.1,10.25,7,5,2.5,0.0125\n2,3,0.1,0,7,,,\n";
     assert_eq!(text(csv.finish().unwrap()), expected);
 }
 
@@ -179,6 +200,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         outline: None,
         picture: None,
         tag: None,
+        depth: None,
         leaves: None,
         bark: None,
         masks: None,
@@ -283,7 +305,7 @@ fn a_full_disk_is_named_by_the_row_writers() {
         .find_map(|p| csv.pose(p).err())
         .expect("nothing fits on a full disk");
     assert!(matches!(error, WriteError::DiskFull { .. }), "{error}");
-    let short = TracksCsv::new(full()).unwrap().finish().unwrap_err();
+    let short = TracksCsv::new(full(), false).unwrap().finish().unwrap_err();
     assert!(matches!(short, WriteError::DiskFull { .. }), "{short}");
 }
 

@@ -606,7 +606,7 @@ fn posed_clip(clip: &Path, outline: &Path) -> (Skeleton, Pose, Rgb, Outline) {
     use arborcam::model::TimedFrame;
     use arborcam::source;
     let config = Config::default();
-    let mut source = source::open(clip, &config.camera, None).expect("clip");
+    let mut source = source::open(clip, &config, None).expect("clip");
     let frames: Vec<_> = std::iter::from_fn(|| source.next_frame().expect("frame")).collect();
     let outline = match arborcam::outline::load(outline, frames[0].size).expect("outline") {
         arborcam::outline::Given::Region(outline) => outline,

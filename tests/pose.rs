@@ -4,7 +4,7 @@
 mod chance;
 
 use arborcam::config::{Motion, MotionMethod};
-use arborcam::model::{Node, NodeId, NodeName, Pose, Size, Skeleton};
+use arborcam::model::{Node, NodeDepth, NodeId, NodeName, Pose, Size, Skeleton};
 use arborcam::motion::{PoseEstimator, Problem};
 use chance::Chance;
 use nalgebra::{Point2, Point3, Unit, UnitQuaternion, UnitVector3, Vector2, Vector3, distance};
@@ -60,6 +60,7 @@ fn some_problem(chance: &mut Chance, ours: bool) -> Problem {
         sigma_turn: ours.then_some(0.3),
         max_step,
         max_total,
+        depth: None,
     }
 }
 
@@ -83,13 +84,55 @@ fn exhaustive(p: &Problem) -> f64 {
     least
 }
 
+/// The picture alone cannot tell a branch that leans to the viewer from one that leans away; what is
+/// not known in depth is as it was.
+#[test]
+fn a_depth_that_is_seen_says_to_which_side_a_branch_leans() {
+    let leaning = |z: f64| Unit::new_normalize(Vector3::new(0.6, 0.5, z));
+    let mut p = Problem {
+        parent_rotation: UnitQuaternion::identity(),
+        length: 60.0,
+        target: Some(60.0 * leaning(-0.4).xy()),
+        depth: None,
+        parent_direction: Some(Vector3::y_axis()),
+        rest_direction: leaning(0.4),
+        previous_direction: leaning(0.4),
+        sigma_track_px: 1.0,
+        sigma_shape: 0.3,
+        sigma_depth: None,
+        sigma_lean: Some(0.2),
+        sigma_turn: Some(0.3),
+        max_step: PI,
+        max_total: PI,
+    };
+    assert!(p.solve().z > 0.3);
+    p.depth = Some(NodeDepth {
+        z_px: 60.0 * leaning(-0.4).z,
+        sd_px: 1.0,
+    });
+    let found = p.solve();
+    assert!(found.angle(&leaning(-0.4)) < 0.05, "{found:?}");
+    // A measurement that says next to nothing changes next to nothing.
+    p.depth = p.depth.map(|depth| NodeDepth {
+        sd_px: 1e6,
+        ..depth
+    });
+    assert!(p.solve().z > 0.3);
+}
+
 #[test]
 fn the_search_finds_what_trying_everything_finds_or_better() {
-    for ours in [false, true] {
+    for (ours, has_depth) in [(false, false), (true, false), (false, true), (true, true)] {
         let mut chance = Chance::new(7);
         let (mut better, mut on_bounds) = (0, 0);
         for k in 0..500 {
-            let p = some_problem(&mut chance, ours);
+            let mut p = some_problem(&mut chance, ours);
+            if has_depth {
+                p.depth = Some(NodeDepth {
+                    z_px: p.length * (2.4 * chance.even() - 1.2),
+                    sd_px: 0.2 + 10.0 * chance.even(),
+                });
+            }
             let found = p.solve();
             let (stepped, turned) = (
                 p.previous_direction.angle(&found),
@@ -289,6 +332,7 @@ fn spin(max_total: f64) -> (f64, f64) {
         sigma_turn: None,
         max_step: 20f64.to_radians(),
         max_total,
+        depth: None,
     };
     let (mut farthest, mut most_round, mut round, mut azimuth) = (0.0_f64, 0.0_f64, 0.0, 0.0_f64);
     for k in 1..=120 {

@@ -165,6 +165,7 @@ fn seen(tree: &Skeleton, truth: &Pose, noise_px: f64, chance: &mut Chance) -> Tr
                 fb_error_px: 0.0,
                 error_px: None,
                 confirmed: true,
+                depth: None,
             });
         }
     }

@@ -175,6 +175,7 @@ impl Source for Camera {
             nominal_rate_hz: Some(30.0),
             frames_total: None,
             live: true,
+            depth: None,
         }
     }
 
@@ -876,6 +877,7 @@ impl Source for Stuck {
             nominal_rate_hz: Some(30.0),
             frames_total: None,
             live: true,
+            depth: None,
         }
     }
 

@@ -2,7 +2,7 @@
 
 mod support;
 
-use arborcam::config::{self, Config};
+use arborcam::config::Config;
 use arborcam::model::{FormatNote, PixelFormat, RawFrame, Size, seconds};
 use arborcam::recording::{Encoding, Head, Limits, Picture, Reader, Series};
 use arborcam::runtime::{self, Job, Pace, QUEUE_BYTES, RecordJob, RecordTo};
@@ -45,6 +45,7 @@ fn frame(n: u64, format: PixelFormat) -> RawFrame {
         size: SMALL,
         format,
         bytes,
+        depth: None,
     }
 }
 
@@ -281,7 +282,7 @@ fn files_with(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 }
 
 fn refusal(path: &Path) -> String {
-    source::open(path, &config::Camera::default(), None)
+    source::open(path, &Config::default(), None)
         .err()
         .expect("it is refused")
         .to_string()
@@ -356,7 +357,7 @@ fn other_programs_files_are_read_or_refused_with_their_topics() {
             "other.mcap",
             &file_by_another_program(&["/cam/image"], compression),
         );
-        let mut source = source::open(&path, &config::Camera::default(), None).expect("opened");
+        let mut source = source::open(&path, &Config::default(), None).expect("opened");
         assert_eq!(
             (source.describe().frames_total, source.describe().size),
             (Some(10), support::SIZE)
@@ -420,6 +421,7 @@ impl Source for Replayed {
             nominal_rate_hz: Some(30.0),
             frames_total: None,
             live: self.live,
+            depth: None,
         }
     }
 }
@@ -492,7 +494,7 @@ fn a_replay_of_a_recording_is_the_run_that_made_it() {
         .expect("recorded");
     assert_eq!((recorded.frames, recorded.files), (330, 1));
     run(
-        source::open(&path, &config::Camera::default(), None).expect("opened"),
+        source::open(&path, &Config::default(), None).expect("opened"),
         &second,
         None,
     );

@@ -476,6 +476,7 @@ fn swaying_stem(frame: u64, time_s: f64) -> TrackSet {
             fb_error_px: 0.02,
             error_px: None,
             confirmed: true,
+            depth: None,
         }
     };
     TrackSet {

@@ -51,6 +51,7 @@ impl Source for Fake {
             nominal_rate_hz: Some(30.0),
             frames_total: None,
             live: self.live,
+            depth: None,
         }
     }
 }

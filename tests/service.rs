@@ -576,6 +576,7 @@ const INSTALLED: &[&str] = &[
     "usr/share/doc/arborcam/dynamics.md",
     "usr/share/doc/arborcam/gallery.md",
     "usr/share/doc/arborcam/markers.md",
+    "usr/share/doc/arborcam/depth.md",
     "usr/share/doc/arborcam/clouds.md",
     "usr/share/doc/arborcam/sketch.md",
 ];

@@ -1,6 +1,6 @@
 //! Frames from files: nothing is lost, invented or re-timed, and a bad input is refused in words.
 
-use arborcam::config;
+use arborcam::config::Config;
 use arborcam::model::{Luma, PixelFormat, RawFrame, Size};
 use arborcam::source::{DecodeError, Decoder, Source, SourceError, open};
 use std::path::{Path, PathBuf};
@@ -18,11 +18,11 @@ fn ffmpeg(arguments: &[&str], out: &Path) {
 }
 
 fn opened(input: &Path) -> Box<dyn Source> {
-    open(input, &config::Camera::default(), None).unwrap_or_else(|e| panic!("{e}"))
+    open(input, &Config::default(), None).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn refused(input: &Path) -> SourceError {
-    let error = open(input, &config::Camera::default(), None)
+    let error = open(input, &Config::default(), None)
         .err()
         .expect("an error");
     let line = error.to_string();
@@ -85,6 +85,7 @@ fn mjpeg_frame(bytes: Vec<u8>, width: u32, height: u32) -> RawFrame {
         size: Size::new(width, height),
         format: PixelFormat::Mjpeg,
         bytes,
+        depth: None,
     }
 }
 
@@ -406,7 +407,7 @@ fn pictures_come_in_the_order_of_their_numbers_at_the_given_rate() {
     }
     std::fs::write(dir.path().join("notes.txt"), "not a picture").expect("write");
     let mut source =
-        open(dir.path(), &config::Camera::default(), Some(20.0)).unwrap_or_else(|e| panic!("{e}"));
+        open(dir.path(), &Config::default(), Some(20.0)).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(
         (
             source.describe().frames_total,
@@ -445,7 +446,7 @@ fn a_folder_names_the_picture_that_does_not_fit() {
         std::fs::remove_file(path).expect("remove");
     }
     for rate in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = open(dir.path(), &config::Camera::default(), Some(rate))
+        let error = open(dir.path(), &Config::default(), Some(rate))
             .err()
             .expect("no rate");
         assert!(error.to_string().contains("--fps"), "{error}");
@@ -481,6 +482,7 @@ fn every_format_decodes_to_the_same_brightness() {
             size,
             format,
             bytes,
+            depth: None,
         };
         let found = luma(&frame).expect("luma");
         let off = difference(&found.pixels, &grey);
@@ -526,6 +528,7 @@ fn the_preview_shows_the_colours_of_the_picture() {
             size: Size::new(64, 8),
             format,
             bytes,
+            depth: None,
         };
         let small = Decoder::new()
             .expect("decoder")

@@ -408,6 +408,7 @@ fn problem(target: Option<Vector2<f64>>) -> Problem {
         sigma_turn: None,
         max_step: 0.2,
         max_total: 0.5,
+        depth: None,
     }
 }
 

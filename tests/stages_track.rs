@@ -48,6 +48,7 @@ fn frame(k: u64, at: impl Fn(f64, f64) -> f64) -> Frame {
         preview: None,
         colour: None,
         raw: None,
+        depth: None,
     }
 }
 
@@ -359,6 +360,7 @@ fn observation(i: u32, k: u64, amplitude_px: f64) -> Observation {
         fb_error_px: 0.05,
         error_px: Some(0.1),
         confirmed: true,
+        depth: None,
     }
 }
 

@@ -50,6 +50,10 @@ class Marker:
             np.full(count, first_node + node), np.full(count, frac * segments - node), offset, still, still[:, 0], still[:, 0],
             facets, np.tile(RED_BGR, (len(facets), 1)), np.full(len(facets), branch.id), np.zeros(len(facets), bool))
 
+    def places_m(self, pose, frames):
+        """(frames, 3) where its centre is, in the tree's metres."""
+        return np.stack([self.skin.vertices_m(pose, f, 0.0)[0] for f in range(frames)])
+
     def places_px(self, pose, camera, frames):
         """(frames, 2) where its centre is."""
         return np.stack([camera.project(self.skin.vertices_m(pose, f, 0.0)[:1])[0] for f in range(frames)])
@@ -65,6 +69,8 @@ def put_on(number, branches, pose, camera, skin, frames, hidden):
             break
         marker = Marker(branch, frac, pose.first[branch.id], camera.px_per_m)
         marker.places = marker.places_px(pose, camera, frames)
+        if hasattr(camera, "seen_m"):
+            marker.seen_m = camera.seen_m(marker.places_m(pose, frames))
         inside = ((marker.places > 2 * WINDOW_PX) & (marker.places < np.array([picture.WIDTH, picture.HEIGHT]) - 2 * WINDOW_PX)).all()
         apart = all(np.linalg.norm(marker.places - m.places, axis=1).min() > LEAST_APART_PX for m in chosen)
         if inside and apart and is_seen(marker, [m.skin for m in chosen], skin, pose, camera, hidden):
@@ -112,6 +118,9 @@ def as_truth(markers, board, hidden):
     by_marker = dict(zip(map(id, markers), names(markers)))
     listed = [dict(name=by_marker[id(m)], branch=m.branch.id, frac=m.frac, parent=by_marker.get(id(m.parent)), freq_hz=m.branch.freq_hz,
                    damping=m.branch.damping, places_px=np.round(m.places, 3).tolist()) for m in markers]
+    for entry, m in zip(listed, markers):
+        if hasattr(m, "seen_m"):
+            entry["places_m"] = np.round(m.seen_m, 5).tolist()
     return dict(radius_px=RADIUS_PX, markers=listed,
                 hidden=None if board is None else dict(name=by_marker[id(hidden)], from_s=board.from_s, to_s=board.to_s))
 

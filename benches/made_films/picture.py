@@ -72,10 +72,12 @@ class Film:
              "-fflags", "+bitexact", str(path)],
             stdin=subprocess.PIPE)
 
-    def add(self, image):
+    def noisy(self, image):
         y, x = self.rng.integers(HEIGHT), self.rng.integers(WIDTH)
-        noisy = np.clip(image + self.bank[y : y + HEIGHT, x : x + WIDTH] + 0.5, 0, 255).astype(np.uint8)
-        self.ffmpeg.stdin.write(noisy.tobytes())
+        return np.clip(image + self.bank[y : y + HEIGHT, x : x + WIDTH] + 0.5, 0, 255).astype(np.uint8)
+
+    def add(self, image):
+        self.ffmpeg.stdin.write(self.noisy(image).tobytes())
 
     def close(self):
         self.ffmpeg.stdin.close()
@@ -83,8 +85,8 @@ class Film:
             raise SystemExit("ffmpeg could not write the film")
 
 
-def film(path, rng, background, surface, pose, camera, frames, bad_input):
-    """Write the film. Only the part of the picture that a tree ever reaches is drawn anew in each frame."""
+def film(path, rng, background, surface, pose, camera, frames, bad_input, depth_film=None):
+    """Write the film, or with a depth camera its images. Only the part of the picture that a tree ever reaches is drawn anew in each frame."""
     trees = [(t.skin, t.pose, t.camera) for t in bad_input.trees(surface, pose, camera)]
     colours = [[tuple(map(float, c)) for c in np.clip(skin.colour, 0, 255)] for skin, _, _ in trees]
     clean, out = fine_canvas(background), Film(path, rng)
@@ -105,8 +107,15 @@ def film(path, rng, background, surface, pose, camera, frames, bad_input):
             draw(canvas, skin, bad_input.moves.vertices_m(skin, pose, camera, f), camera, colour)
         bad_input.before_tree(canvas, f / FPS)
         image[y0:y1, x0:x1] = cv2.resize(canvas[box], (x1 - x0, y1 - y0), interpolation=cv2.INTER_AREA)
-        out.add(bad_input.light(image, f / FPS))
+        if depth_film is None:
+            out.add(bad_input.light(image, f / FPS))
+            continue
+        depth_film.colours(f, out.noisy(bad_input.light(image, f / FPS)))
+        depth_film.depths(f, surface, surface.vertices_m(pose, f, f / FPS))
     out.close()
+    if depth_film is not None:
+        depth_film.close()
+        path.unlink()
 
 
 def reach_px(pose, camera):

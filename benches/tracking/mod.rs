@@ -96,7 +96,7 @@ fn busy() -> String {
 /// During the trial, after it, and of the first frame, ms.
 fn costs(clip: &Path, wanted: u32) -> (Costs, Costs, f64) {
     let settings = Config::default();
-    let mut source = source::open(clip, &settings.camera, None).expect("clip");
+    let mut source = source::open(clip, &settings, None).expect("clip");
     let mut decoder = Decoder::new().expect("decoder");
     let mut next = |index: u64| {
         let raw = source.next_frame().expect("frame")?;
@@ -113,6 +113,7 @@ fn costs(clip: &Path, wanted: u32) -> (Costs, Costs, f64) {
             preview: None,
             colour: None,
             raw: None,
+            depth: None,
         })
     };
     let mut before = next(0).expect("a frame");
@@ -161,7 +162,7 @@ fn costs(clip: &Path, wanted: u32) -> (Costs, Costs, f64) {
 /// Shortest time in which the points of a trial are found, ms.
 fn detection(clip: &Path) -> f64 {
     let settings = Config::default();
-    let mut source = source::open(clip, &settings.camera, None).expect("clip");
+    let mut source = source::open(clip, &settings, None).expect("clip");
     let raw = source.next_frame().expect("frame").expect("a frame");
     let mut luma = Luma {
         size: raw.size,

@@ -2,6 +2,7 @@
 
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
+use super::depth::DepthArgs;
 use super::markers::MarkerArgs;
 use super::notes::NoteArgs;
 use super::scale::ScaleArgs;
@@ -46,6 +47,8 @@ pub struct Common {
     #[command(flatten)]
     pub markers: MarkerArgs,
     #[command(flatten)]
+    pub depth: DepthArgs,
+    #[command(flatten)]
     pub notes: NoteArgs,
 }
 
@@ -66,6 +69,7 @@ impl Common {
             self.shape.set(config);
             self.strokes.set(config);
             self.markers.set(config);
+            self.depth.set(&mut config.depth);
             if let Some(camera) = camera {
                 camera.set(&mut config.camera);
             }

@@ -7,6 +7,7 @@ mod capture;
 mod cloud;
 mod command_error;
 mod common;
+mod depth;
 mod devices;
 mod doctor;
 mod example;

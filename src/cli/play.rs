@@ -5,7 +5,7 @@ use super::common::check_fps;
 use super::hangup::SighupAction;
 use super::output::eprint_line;
 use super::session::{init_log, stop_on_signals};
-use crate::config;
+use crate::config::Config;
 use crate::runtime::{self, Played};
 use crate::source::{self, Loopback, Source, SourceError};
 use clap::Args;
@@ -34,9 +34,11 @@ pub fn run(args: &PlayArgs) -> Result<(), CommandError> {
     let mut output = None;
     let mut frames = 0;
     let stopped = loop {
-        let camera = config::Camera::default();
+        let mut config = Config::default();
+        // A loopback device has colours alone.
+        config.depth.read = false;
         let mut source =
-            source::open(&args.input, &camera, Some(args.fps)).map_err(CommandError::no_input)?;
+            source::open(&args.input, &config, Some(args.fps)).map_err(CommandError::no_input)?;
         source.stop_when(stop.clone());
         let played = match play_once(source.as_mut(), &args.to, &mut output, &stop) {
             Ok(played) => played,

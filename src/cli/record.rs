@@ -2,6 +2,7 @@
 
 use super::camera::CameraArgs;
 use super::command_error::CommandError;
+use super::depth::DepthArgs;
 use super::hangup::SighupAction;
 use super::notes::NoteArgs;
 use super::output::eprint_line;
@@ -30,11 +31,13 @@ pub struct RecordArgs {
     #[command(flatten)]
     camera: CameraArgs,
     #[command(flatten)]
+    depth: DepthArgs,
+    #[command(flatten)]
     limits: LimitArgs,
     #[command(flatten)]
     notes: NoteArgs,
-    /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` is
-    /// used.
+    /// Settings that differ from the defaults (TOML; see config/arborcam.toml); only `[camera]` and
+    /// `[depth]` are used.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
 }
@@ -42,11 +45,11 @@ pub struct RecordArgs {
 pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |config| {
         args.camera.set(&mut config.camera);
+        args.depth.set(&mut config.depth);
     })?;
     args.notes.check()?;
     recording::check_new_file(&args.file)?;
-    let source =
-        runtime::open(&args.device, &config.camera, None).map_err(CommandError::no_input)?;
+    let source = runtime::open(&args.device, &config, None).map_err(CommandError::no_input)?;
     let info = source.describe();
     let notes = args.notes.over(&*source)?;
     let stop = stop_on_signals(SighupAction::ends_this_process())?;

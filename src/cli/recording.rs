@@ -75,6 +75,7 @@ pub fn target(path: &Path, limits: Limits, source: &dyn Source, notes: &UserNote
             notes: notes.clone(),
             ..source.origin()
         },
+        depth: info.depth,
     };
     RecordTo {
         path: path.to_owned(),

@@ -52,8 +52,7 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let config = common.config(plan.camera)?;
     let headless = common.headless || common.stream.is_some();
     check_arguments(common, &plan, headless)?;
-    let source =
-        runtime::open(plan.input, &config.camera, plan.fps).map_err(CommandError::no_input)?;
+    let source = runtime::open(plan.input, &config, plan.fps).map_err(CommandError::no_input)?;
     let job = job(common, &plan, config, &*source, headless)?;
     let action = SighupAction::of_this_process();
     let stop = stop_on_signals(action == SighupAction::Stop)?;
@@ -122,6 +121,7 @@ fn job(
     common.scale.check_size(info.size)?;
     common.strokes.check_size(info.size)?;
     common.markers.check_size(info.size)?;
+    common.depth.check_size(info.size)?;
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {

@@ -124,6 +124,31 @@ settings! {
         size_m: f64 [0 ("none") to 100] = 0.0;
     }
 
+    /// Depth beside the colours, where the film has it. See docs/depth.md.
+    depth: Depth, SCALE {
+        /// Take it (true), or the colours alone (false); `--no-depth`.
+        read: bool = true;
+        /// Metres for each count of a depth image, e.g. 0.001; `--depth-unit` sets it. Give it where the
+        /// film or the camera does not say it.
+        unit_m: f64 [0 ("as the film says") to 1] = 0.0;
+        /// Standard deviation of a depth that is the same at any distance, m. Give it for a camera that
+        /// times light: 0.005 to 0.02.
+        noise_m: f64 [0 to 10] = 0.0;
+        /// The same at 1 m where it grows with the square of the distance, as with stripes or two
+        /// cameras, m. The default was measured on a first Kinect (Khoshelham and Elberink 2012); 0 for
+        /// a camera that times light, 0.002 to 0.004 for two cameras near each other.
+        noise_per_m: f64 [0 to 1] = 0.001425;
+        /// Focal length of the colour camera across, px; `--depth-camera` sets it and the next three.
+        /// Give them where the film does not say them.
+        fx_px: f64 [0 ("as the film says") or more] = 0.0;
+        /// The same down, px.
+        fy_px: f64 [0 ("as the film says") or more] = 0.0;
+        /// Where the camera's axis meets the picture, px from the left.
+        cx_px: f64 [0 or more] = 0.0;
+        /// The same, px from the top.
+        cy_px: f64 [0 or more] = 0.0;
+    }
+
     /// When enough motion has been seen to build the tree.
     accumulate: Accumulate, TREE {
         /// Motion older than this is forgotten, s.

@@ -1,6 +1,6 @@
 //! What there is to film with, and a second of film.
 
-use crate::config;
+use crate::config::{self, Config};
 use crate::source::{self, SourceError};
 use std::fs::OpenOptions;
 use std::io::ErrorKind;
@@ -96,7 +96,11 @@ pub fn film(device: &Path, settings: &config::Camera) -> Film {
 }
 
 fn sample(device: &Path, settings: &config::Camera) -> Result<Film, SourceError> {
-    let mut source = source::open(device, settings, None)?;
+    let config = Config {
+        camera: settings.clone(),
+        ..Config::default()
+    };
+    let mut source = source::open(device, &config, None)?;
     let format = source.describe().format;
     let (until, mut times_s, mut bytes, mut now_s) =
         (Instant::now() + SAMPLE_LIMIT, Vec::new(), 0, 0.0);

@@ -35,6 +35,7 @@ pub fn decode_ms(size: Size) -> Result<f64, String> {
         size: PROBE_SIZE,
         format: PixelFormat::Mjpeg,
         bytes: PROBE.to_vec(),
+        depth: None,
     };
     let mut luma = Luma {
         size: PROBE_SIZE,
@@ -73,6 +74,7 @@ pub fn frames_per_s(config: &Config) -> f64 {
             preview: None::<Arc<_>>,
             colour: None,
             raw: None,
+            depth: None,
         }));
         if n == 0 {
             began = Instant::now();

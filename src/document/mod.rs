@@ -39,7 +39,7 @@ pub use marked::MarkedTree;
 pub use modes::{MODES_FILE, modes};
 pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};
-pub use note::{CaptureNote, SCHEMA_VERSION};
+pub use note::{CaptureNote, DepthNote, SCHEMA_VERSION};
 pub use number::push as push_number;
 pub use picture::{PICTURE_FILE, jpeg};
 pub use png::{grey_png, png};

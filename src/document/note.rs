@@ -45,6 +45,9 @@ pub struct CaptureNote {
     /// What a printed tag beside the trunk says of the scale; `None` where none was seen.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag: Option<TagScale>,
+    /// What a depth camera has seen of the tree; `None` in a film without depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthNote>,
     /// `None` where no trunk was seen: the bark's colour is a guess then.
     pub bark: Option<BarkNote>,
     /// `None` but for trees that were grown like one whose film shows its leaves.
@@ -85,6 +88,21 @@ impl Default for Software {
             version: env!("CARGO_PKG_VERSION").into(),
         }
     }
+}
+
+/// What a depth camera has seen of a tree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DepthNote {
+    /// Distance of the trunk's foot from the camera along its axis, m.
+    pub foot_m: f64,
+    /// Length of a pixel at that distance, m.
+    pub metres_per_px: f64,
+    /// Points whose depth at rest is known.
+    pub points: u64,
+    /// Measured nodes, and those of them whose place along the line of sight was seen; that of the
+    /// others is a guess.
+    pub nodes: u64,
+    pub nodes_seen: u64,
 }
 
 /// What a point cloud showed.
@@ -409,6 +427,7 @@ impl CaptureNote {
             picture: None,
             bark: None,
             tag: None,
+            depth: None,
             leaves: None,
             masks: None,
             scan: None,

@@ -23,44 +23,70 @@ pub const TRACKS_FILE: &str = "tracks.csv";
 /// The points that were left out of the tree, in a table like that of the others.
 pub const LEFT_OUT_FILE: &str = "left_out.csv";
 pub const TRACKS_HEADER: &str = "track_id,frame,time_s,u_px,v_px,node_id";
+/// The same with what a depth camera has seen of the points.
+pub const TRACKS_WITH_DEPTH_HEADER: &str =
+    "track_id,frame,time_s,u_px,v_px,node_id,depth_m,depth_sd_m";
 const COLUMNS: [&str; 6] = ["track_id", "frame", "time_s", "u_px", "v_px", "node_id"];
 
 /// Writes `tracks.csv` or `left_out.csv`.
-pub struct TracksCsv<W: Write>(TableWriter<W>);
+pub struct TracksCsv<W: Write> {
+    table: TableWriter<W>,
+    has_depth: bool,
+}
 
 impl<W: Write> TracksCsv<W> {
+    /// `has_depth`: with columns for it, in a film that has depth.
+    ///
     /// # Errors
     /// The header cannot be written.
-    pub fn new(out: W) -> Result<Self, WriteError> {
-        TableWriter::new(TRACKS_FILE, TRACKS_HEADER, out).map(Self)
+    pub fn new(out: W, has_depth: bool) -> Result<Self, WriteError> {
+        Self::begin(TRACKS_FILE, out, has_depth)
     }
 
     /// The table of the points that were left out of the tree.
     ///
     /// # Errors
     /// The header cannot be written.
-    pub fn of_left_out(out: W) -> Result<Self, WriteError> {
-        TableWriter::new(LEFT_OUT_FILE, TRACKS_HEADER, out).map(Self)
+    pub fn of_left_out(out: W, has_depth: bool) -> Result<Self, WriteError> {
+        Self::begin(LEFT_OUT_FILE, out, has_depth)
     }
 
-    /// One point in one frame, where it was filmed; `node` is the deepest one that it belongs to.
+    fn begin(file: &'static str, out: W, has_depth: bool) -> Result<Self, WriteError> {
+        let header = if has_depth {
+            TRACKS_WITH_DEPTH_HEADER
+        } else {
+            TRACKS_HEADER
+        };
+        let table = TableWriter::new(file, header, out)?;
+        Ok(Self { table, has_depth })
+    }
+
+    /// A point of the frame `set`, where it was filmed; `node` is the deepest one that it belongs to.
     ///
     /// # Errors
     /// The row cannot be written.
     pub fn row(
         &mut self,
-        track: TrackId,
-        frame: u64,
-        time_s: f64,
-        filmed_px: Point2<f64>,
+        set: &TrackSet,
+        point: &Observation,
         node: Option<NodeName>,
     ) -> Result<(), WriteError> {
-        self.0.count(track.0);
-        self.0.count(frame);
-        self.0.number(time_s, 6);
-        filmed_px.iter().for_each(|x| self.0.number(*x, 3));
-        self.0.id(node);
-        self.0.end_row()
+        let table = &mut self.table;
+        table.count(point.id.0);
+        table.count(set.frame);
+        table.number(set.time_s, 6);
+        set.filmed_px(point)
+            .iter()
+            .for_each(|x| table.number(*x, 3));
+        table.id(node);
+        if self.has_depth {
+            let (depth_m, sd_m) = point
+                .depth
+                .map_or((f32::NAN, f32::NAN), |d| (d.depth_m, d.sd_m));
+            table.number(depth_m.into(), 4);
+            table.number(sd_m.into(), 4);
+        }
+        table.end_row()
     }
 
     /// All points of one frame.
@@ -73,7 +99,7 @@ impl<W: Write> TracksCsv<W> {
         node_of: impl Fn(TrackId) -> Option<NodeName>,
     ) -> Result<(), WriteError> {
         for o in &set.observations {
-            self.row(o.id, set.frame, set.time_s, set.filmed_px(o), node_of(o.id))?;
+            self.row(set, o, node_of(o.id))?;
         }
         Ok(())
     }
@@ -84,7 +110,7 @@ impl<W: Write> TracksCsv<W> {
     /// # Errors
     /// The last rows cannot be written.
     pub fn finish(self) -> Result<W, WriteError> {
-        self.0.finish()
+        self.table.finish()
     }
 }
 
@@ -265,6 +291,7 @@ impl<'a> TracksReader<'a> {
                 fb_error_px: 0.0,
                 error_px: None,
                 confirmed: true,
+                depth: None,
             },
             node: None,
         };

@@ -253,6 +253,7 @@ mod tests {
             fb_error_px: 0.05,
             error_px: None,
             confirmed: true,
+            depth: None,
         }
     }
 

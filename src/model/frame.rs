@@ -1,5 +1,6 @@
 //! Pictures, as the camera delivered them and as the tracker wants them.
 
+use super::DepthImage;
 use nalgebra::{Point2, Vector3};
 use std::sync::Arc;
 use std::time::Instant;
@@ -121,6 +122,15 @@ pub struct RawFrame {
     pub size: Size,
     pub format: PixelFormat,
     pub bytes: Vec<u8>,
+    /// The depth image that belongs to it.
+    pub depth: Option<Arc<DepthImage>>,
+}
+
+impl RawFrame {
+    /// Memory that it takes, bytes.
+    pub fn all_bytes(&self) -> usize {
+        self.bytes.len() + self.depth.as_ref().map_or(0, |depth| depth.bytes())
+    }
 }
 
 /// A raw frame with its place in the film.
@@ -255,6 +265,8 @@ pub struct Frame {
     /// The frame as it came, from which its colours can be had later; `None` where only the luma is
     /// known.
     pub raw: Option<Arc<RawFrame>>,
+    /// The depth image that belongs to it.
+    pub depth: Option<Arc<DepthImage>>,
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ mod branch_graph;
 mod camera_motion;
 mod capture_facts;
 mod control;
+mod depth;
 mod foot;
 mod forest;
 mod frame;
@@ -46,6 +47,7 @@ pub use branch_graph::{BranchGraph, RADIUS_SHARE, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
+pub use depth::{DepthFormat, DepthImage, DepthSeen, NodeDepth, Pinhole, RestDepths};
 pub use foot::{Foot, FootBasis, TrunkRow};
 pub use forest::{Forest, ForestTree, Ground};
 pub use frame::{

@@ -1,6 +1,6 @@
 //! Points followed from frame to frame.
 
-use super::CameraMotion;
+use super::{CameraMotion, DepthSeen};
 use nalgebra::Point2;
 
 /// Names one tracked point for good: an id is never given to a second point.
@@ -41,6 +41,8 @@ pub struct Observation {
     pub error_px: Option<f32>,
     /// Its trial is over; of those on trial about half will be dropped.
     pub confirmed: bool,
+    /// How far away it is, where a depth camera has seen that.
+    pub depth: Option<DepthSeen>,
 }
 
 impl Observation {

@@ -239,6 +239,7 @@ mod tests {
             fb_error_px: 0.0,
             error_px: None,
             confirmed,
+            depth: None,
         }
     }
 

@@ -1,9 +1,12 @@
 //! Which track moves which node, and where the tracks of a frame put every node in the picture.
 
 use super::local::{self, Nearby};
-use crate::model::{MotionHierarchy, NodeId, Skeleton, TrackId, TrackSet};
-use nalgebra::Point2;
+use crate::model::{
+    MotionHierarchy, NodeDepth, NodeId, Observation, RestDepths, Skeleton, TrackId, TrackSet,
+};
+use nalgebra::{Point2, Vector2};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// A later track is given to the nearest tip only within so many times the mean distance between
 /// tips.
@@ -33,6 +36,10 @@ pub struct Binding {
     least_px: f64,
     /// Points of the present frame by node; kept for their memory.
     collected: Vec<Vec<Nearby>>,
+    /// What a depth camera has seen of the tree at rest.
+    depths: Option<Arc<RestDepths>>,
+    /// How far towards the viewer each measured node is at rest, px.
+    rest_z_px: Vec<f64>,
 }
 
 impl Binding {
@@ -78,6 +85,8 @@ impl Binding {
             parents,
             collected: vec![Vec::new(); nodes.len()],
             rest_px: rest,
+            rest_z_px: nodes.iter().map(|n| n.position.z).collect(),
+            depths: None,
             tips,
             least_px: LEAST * f64::from(skeleton.image_size.width),
         }
@@ -89,6 +98,57 @@ impl Binding {
         for (&id, &(node, rest_px)) in tracks {
             self.tracks.insert(id, Some(Bound { node, rest_px }));
         }
+    }
+
+    /// Takes what a depth camera has seen of the tree at rest.
+    pub fn see_depths(&mut self, depths: Option<Arc<RestDepths>>) {
+        self.depths = depths;
+    }
+
+    /// How far towards the viewer the tracks put each measured node, model axes; `None` where none of
+    /// them has a depth. Empty in a film without depth.
+    pub fn target_depths(&self, set: &TrackSet) -> Vec<Option<NodeDepth>> {
+        let Some(depths) = &self.depths else {
+            return Vec::new();
+        };
+        let mut seen: Vec<DepthsOfNode> = vec![DepthsOfNode::default(); self.parents.len()];
+        for o in &set.observations {
+            let Some(bound) = self.moving(o) else {
+                continue;
+            };
+            let Some((now, rest)) = o.depth.zip(depths.tracks.get(&o.id).copied()) else {
+                continue;
+            };
+            let (now, rest) = (depths.in_model(now), depths.in_model(rest));
+            for node in self.carriers(bound.node) {
+                seen[node.index()].points.push(Nearby {
+                    displacement: Vector2::new(now.z_px - rest.z_px, 0.0),
+                    offset: bound.rest_px - self.rest_px[node.index()],
+                });
+                seen[node.index()].precision +=
+                    (now.sd_px * now.sd_px + rest.sd_px * rest.sd_px).recip();
+            }
+        }
+        let mut out = Vec::with_capacity(seen.len());
+        for (mut seen, rest_z_px) in seen.into_iter().zip(&self.rest_z_px) {
+            let moved = seen.moved(self.least_px);
+            out.push(moved.map(|moved| NodeDepth {
+                z_px: rest_z_px + moved.z_px,
+                ..moved
+            }));
+        }
+        out
+    }
+
+    /// Where a point is bound that moves something.
+    fn moving(&self, o: &Observation) -> Option<Bound> {
+        let bound = self.tracks.get(&o.id).copied().flatten()?;
+        (!self.left_out.contains(&o.id)).then_some(bound)
+    }
+
+    /// A node and all that carry it.
+    fn carriers(&self, node: NodeId) -> impl Iterator<Item = NodeId> {
+        std::iter::successors(Some(node), |node| self.parents[node.index()])
     }
 
     /// Tracks that move nothing from now on. They stay on their nodes.
@@ -174,12 +234,9 @@ impl Binding {
     fn collect(&mut self, set: &TrackSet) {
         self.collected.iter_mut().for_each(Vec::clear);
         for o in &set.observations {
-            let Some(Some(bound)) = self.tracks.get(&o.id) else {
+            let Some(bound) = self.moving(o) else {
                 continue;
             };
-            if self.left_out.contains(&o.id) {
-                continue;
-            }
             let displacement = o.at_px() - bound.rest_px;
             let mut at = Some(bound.node);
             while let Some(node) = at {
@@ -190,6 +247,29 @@ impl Binding {
                 at = self.parents[node.index()];
             }
         }
+    }
+}
+
+/// The points of a node whose depth is known.
+#[derive(Clone, Debug, Default)]
+struct DepthsOfNode {
+    /// How far each has moved towards the viewer, px, as the first of two parts.
+    points: Vec<Nearby>,
+    /// Sum of one over their variances, px^-2.
+    precision: f64,
+}
+
+impl DepthsOfNode {
+    /// How far the node has moved towards the viewer; `None` without points.
+    fn moved(&mut self, least_px: f64) -> Option<NodeDepth> {
+        let count = self.points.len();
+        let moved = local::displacement(&mut self.points, least_px)?;
+        // As many points as count, each as sure as they are on average.
+        let used = count.min(local::POINTS) as f64;
+        Some(NodeDepth {
+            z_px: moved.x,
+            sd_px: (self.precision * used / count as f64).sqrt().recip(),
+        })
     }
 }
 
@@ -264,6 +344,7 @@ mod tests {
             fb_error_px: 0.0,
             error_px: None,
             confirmed: true,
+            depth: None,
         }
     }
 }

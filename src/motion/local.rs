@@ -6,13 +6,13 @@ use std::cmp::Ordering;
 
 /// A point's displacement in a frame, and where it rests as seen from the place, px.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Nearby {
+pub struct Nearby {
     pub displacement: Vector2<f64>,
     pub offset: Vector2<f64>,
 }
 
 /// So many points are within one standard deviation of the weights, and twice as many count.
-const POINTS: usize = 16;
+pub(super) const POINTS: usize = 16;
 /// Rounds in which points that disagree lose weight: some tracks are always wrong.
 const ROUNDS: usize = 3;
 /// Where there is little to tell the slopes by they are taken for small: as if points of this
@@ -30,7 +30,7 @@ const FLOOR_PX: f64 = 0.05;
 /// A branch that turns moves its points the farther the farther out they are. Their mean is the
 /// motion of their middle, and the node, a fork or a tip, stands at their edge; the slopes take it
 /// there.
-pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>> {
+pub fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>> {
     let used = points.len().min(2 * POINTS);
     if used == 0 {
         return None;

@@ -18,11 +18,12 @@ pub use between::between;
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
 pub use flutter::flutter;
+pub use local::{Nearby, displacement};
 pub use probabilistic::Problem;
 pub use spread::Spread;
 
 use crate::config::{Motion, MotionMethod};
-use crate::model::{JointPose, MovingBranch, NodeId, Pose, Skeleton};
+use crate::model::{JointPose, MovingBranch, NodeDepth, NodeId, Pose, Skeleton};
 use nalgebra::{Point2, Unit, UnitQuaternion, UnitVector3, Vector3, distance};
 use rotation::shortest_rotation;
 use std::f64::consts::PI;
@@ -85,6 +86,14 @@ impl Branch {
     }
 }
 
+/// Where a node is seen in a frame.
+#[derive(Clone, Copy, Debug)]
+struct NodeSeen {
+    target_px: Option<Point2<f64>>,
+    /// Model axes; `None` where it is not known.
+    depth: Option<NodeDepth>,
+}
+
 /// The copy turns in its plane as the original does in its own.
 fn turn_of_copy(copy: &CopyOf, joints: &[JointPose]) -> UnitQuaternion<f64> {
     let parent_rotation = copy
@@ -132,6 +141,18 @@ impl PoseEstimator {
 
     /// The most probable pose, given where the tracks put each measured node (px in the picture).
     pub fn step(&mut self, frame: u64, time_s: f64, targets_px: &[Option<Point2<f64>>]) -> Pose {
+        self.step_in_space(frame, time_s, targets_px, &[])
+    }
+
+    /// The same where a depth camera has seen nodes, too; `depths` has what is known of each measured
+    /// node, and may be empty.
+    pub fn step_in_space(
+        &mut self,
+        frame: u64,
+        time_s: f64,
+        targets_px: &[Option<Point2<f64>>],
+        depths: &[Option<NodeDepth>],
+    ) -> Pose {
         // A clock that stands still must not forbid all motion.
         let elapsed_s = (time_s - self.previous_s).max(1e-3);
         self.previous_s = time_s;
@@ -149,9 +170,12 @@ impl PoseEstimator {
                         position: joints[branch.way.begin.index()].position,
                         rotation: joints[branch.way.parent.index()].rotation,
                     };
-                    let target_px = targets_px.get(i).copied().flatten();
+                    let seen = NodeSeen {
+                        target_px: targets_px.get(i).copied().flatten(),
+                        depth: depths.get(i).copied().flatten(),
+                    };
                     let previous = self.previous.as_ref().map(|p| p[i]);
-                    let d = self.direction(branch, previous, &base, target_px, elapsed_s);
+                    let d = self.direction(branch, previous, &base, seen, elapsed_s);
                     directions[i] = d;
                     shortest_rotation(&branch.direction, &d)
                 }
@@ -191,11 +215,13 @@ impl PoseEstimator {
         branch: &Branch,
         previous: Option<UnitVector3<f64>>,
         base: &JointPose,
-        target_px: Option<Point2<f64>>,
+        seen: NodeSeen,
         elapsed_s: f64,
     ) -> UnitVector3<f64> {
         let foot = self.skeleton.foot_px;
-        let target = target_px.map(|t| Point2::new(t.x - foot.x, foot.y - t.y));
+        let target = seen
+            .target_px
+            .map(|t| Point2::new(t.x - foot.x, foot.y - t.y));
         if branch.length < 1e-6 {
             return branch.direction;
         }
@@ -208,6 +234,10 @@ impl PoseEstimator {
                 parent_rotation: base.rotation,
                 length: branch.length,
                 target: target.map(|t| t - base.position.xy()),
+                depth: seen.depth.map(|depth| NodeDepth {
+                    z_px: depth.z_px - base.position.z,
+                    ..depth
+                }),
                 parent_direction: branch.parent_direction,
                 rest_direction: branch.direction,
                 previous_direction: previous.unwrap_or(branch.direction),

@@ -1,6 +1,7 @@
 //! The probabilistic solution: the rotation that best trades the tracked position against the
 //! branch's own shape, within bounds (Li 2011 sect. 4.2, eq. 7-10).
 
+use crate::model::NodeDepth;
 use nalgebra::{UnitQuaternion, UnitVector3, Vector2};
 
 /// What is known of one branch in one frame. Directions are in the axes of the parent branch at
@@ -12,6 +13,9 @@ pub struct Problem {
     pub length: f64,
     /// Where the node is seen, relative to the local root, model axes, px; `None` where it is not.
     pub target: Option<Vector2<f64>>,
+    /// How far towards the viewer the node is seen from the local root, model axes; `None` where that
+    /// is not known.
+    pub depth: Option<NodeDepth>,
     /// Direction of the parent branch, `None` where there is none.
     pub parent_direction: Option<UnitVector3<f64>>,
     pub rest_direction: UnitVector3<f64>,
@@ -49,7 +53,8 @@ impl Problem {
     /// on the depth itself can. Eq. 10 is the same all round the parent: a piece of two pixels, which
     /// the tracks can turn by a few, would go over to the parent's other side for nothing, and all
     /// that it carries with it. A prior on the turn itself holds it; a branch that the tracks see
-    /// to turn does not feel it.
+    /// to turn does not feel it. What a depth camera has seen of the node is one more normal term; it
+    /// goes before the priors on the depth by its smaller deviation.
     pub fn cost(&self, d: &UnitVector3<f64>) -> f64 {
         let y = self.parent_rotation * d.into_inner();
         let track = self.target.map_or(0.0, |t| {
@@ -67,7 +72,11 @@ impl Problem {
         let turn = self.sigma_turn.map_or(0.0, |sigma| {
             (d.into_inner() - self.rest_direction.into_inner()).norm() / sigma
         });
-        0.5 * (track + shape * shape + depth * depth + lean * lean + turn * turn)
+        let seen = self
+            .depth
+            .map_or(0.0, |seen| (y.z * self.length - seen.z_px) / seen.sd_px);
+        let priors = depth * depth + lean * lean + turn * turn;
+        0.5 * (track + shape * shape + priors + seen * seen)
     }
 
     /// Component of a direction along the line of sight, to the viewer.

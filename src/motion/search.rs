@@ -71,14 +71,14 @@ struct Search {
     previous: UnitVector3<f64>,
     rest: UnitVector3<f64>,
     parent: Option<Parent>,
-    /// One over the standard deviations: of the place, px, of the angle, and of both priors on the
-    /// depth together.
+    /// One over the standard deviations: of the place, px, of the angle, and of all that is known of
+    /// the depth together.
     per_track: f64,
     per_shape: f64,
     per_depth: f64,
     /// One over the standard deviation of the turn from rest; 0 for no prior on it.
     per_turn: f64,
-    /// The depth that the priors on it make most probable, as a sine.
+    /// The depth that all this makes most probable, as a sine.
     depth: f64,
     max_step: f64,
     max_total: f64,
@@ -112,6 +112,13 @@ impl Search {
         let previous = problem.parent_rotation * problem.previous_direction;
         let rest = problem.parent_rotation * problem.rest_direction;
         let (rate, lean) = (weight(problem.sigma_depth), weight(problem.sigma_lean));
+        let mut depth_weight = rate + lean;
+        let mut depth_sum = rate * previous.z + lean * rest.z;
+        if let Some(seen) = problem.depth {
+            let seen_weight = weight(Some(seen.sd_px / problem.length));
+            depth_weight += seen_weight;
+            depth_sum += seen_weight * seen.z_px / problem.length;
+        }
         let parent = problem.parent_direction.map(|p| {
             let direction = (problem.parent_rotation * p).into_inner();
             Parent {
@@ -127,9 +134,9 @@ impl Search {
             parent,
             per_track: 1.0 / problem.sigma_track_px,
             per_shape: 1.0 / problem.sigma_shape,
-            per_depth: (rate + lean).sqrt(),
+            per_depth: depth_weight.sqrt(),
             per_turn: weight(problem.sigma_turn).sqrt(),
-            depth: (rate * previous.z + lean * rest.z) / (rate + lean).max(f64::MIN_POSITIVE),
+            depth: depth_sum / depth_weight.max(f64::MIN_POSITIVE),
             max_step: problem.max_step,
             max_total: problem.max_total,
         }

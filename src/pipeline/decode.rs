@@ -96,7 +96,8 @@ impl DecodeStage {
             luma,
             preview: self.preview(timed),
             colour,
-            raw: Some(timed.raw.clone()),
+            depth: timed.raw.depth.clone(),
+            raw: Some(without_depth(&timed.raw)),
         })
     }
 
@@ -146,6 +147,18 @@ impl DecodeStage {
     }
 }
 
+/// A frame that is kept for its colours alone.
+fn without_depth(raw: &Arc<RawFrame>) -> Arc<RawFrame> {
+    match raw.depth {
+        None => raw.clone(),
+        Some(_) => Arc::new(RawFrame {
+            depth: None,
+            bytes: raw.bytes.clone(),
+            ..**raw
+        }),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,6 +182,7 @@ mod tests {
             size,
             format: PixelFormat::Grey,
             bytes: vec![7; size.area()],
+            depth: None,
         };
         TimedFrame::new(Arc::new(raw), index, 0.0, Instant::now())
     }

@@ -117,6 +117,7 @@ mod tests {
             size: Size::new(1, 1),
             format: PixelFormat::Grey,
             bytes: vec![0; bytes],
+            depth: None,
         });
         for frame in frames {
             let tracks = TrackSet {

@@ -4,8 +4,9 @@ use super::back::Followed;
 use super::marked::MarkerStage;
 use super::tagged::{TagNews, TagStage};
 use crate::config::{Config, MarkerWindow};
+use crate::depth::DepthReader;
 use crate::markers::{MarkerError, MarkerEvent, MarkerPlace};
-use crate::model::{Frame, Luma, Outline};
+use crate::model::{DepthImage, Frame, Luma, Outline, Size, TrackSet};
 use crate::outline::{AutoOutline, Found};
 use crate::track::{Tracker, WholeView};
 use nalgebra::Point2;
@@ -30,6 +31,7 @@ pub struct FrontEnd {
     held: VecDeque<Held>,
     markers: MarkerStage,
     tag: TagStage,
+    depth: Option<DepthReader>,
     next_id: u32,
     spare: Option<Luma>,
     progress: f64,
@@ -49,6 +51,7 @@ impl FrontEnd {
             held: VecDeque::new(),
             markers: MarkerStage::new(&config.markers),
             tag: TagStage::new(&config.tag),
+            depth: DepthReader::new(&config.depth),
             next_id: 0,
             spare: None,
             progress: 0.0,
@@ -183,6 +186,9 @@ impl FrontEnd {
         let Held { frame, markers } = self.held.pop_front()?;
         let mut tracks = tracker.step(&frame);
         MarkerStage::join(&markers, &mut tracks);
+        if let (Some(reader), Some(image)) = (&self.depth, &frame.depth) {
+            look_up_depths(reader, image, frame.luma.size, &mut tracks);
+        }
         self.spare = Some(frame.luma);
         Some(Followed {
             tracks,
@@ -191,6 +197,14 @@ impl FrontEnd {
             raw: frame.raw,
             received: frame.received,
         })
+    }
+}
+
+/// Gives the points of a frame their depth.
+fn look_up_depths(reader: &DepthReader, image: &DepthImage, picture: Size, tracks: &mut TrackSet) {
+    let camera = tracks.camera.clone();
+    for o in &mut tracks.observations {
+        o.depth = reader.at(image, picture, camera.filmed_px(o.at_px()));
     }
 }
 
@@ -205,6 +219,7 @@ impl Held {
     fn bytes(&self) -> usize {
         let preview = self.frame.preview.as_ref().map_or(0, |p| p.pixels.len());
         let raw = self.frame.raw.as_ref().map_or(0, |raw| raw.bytes.len());
-        self.frame.luma.pixels.len() + preview + raw
+        let depth = self.frame.depth.as_ref().map_or(0, |depth| depth.bytes());
+        self.frame.luma.pixels.len() + preview + raw + depth
     }
 }

@@ -73,6 +73,7 @@ impl MarkerStage {
                 fb_error_px: 0.0,
                 error_px: None,
                 confirmed,
+                depth: None,
             });
         }
     }

@@ -29,9 +29,10 @@ impl PoseTracker {
     /// The pose in the next frame, and where its tracks put the measured nodes.
     pub fn step(&mut self, tracks: &TrackSet) -> (Pose, Targets) {
         let targets_px = self.binding.targets_px(tracks);
+        let depths = self.binding.target_depths(tracks);
         let pose = self
             .estimator
-            .step(tracks.frame, tracks.time_s, &targets_px);
+            .step_in_space(tracks.frame, tracks.time_s, &targets_px, &depths);
         (pose, targets_px)
     }
 

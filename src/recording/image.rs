@@ -2,13 +2,14 @@
 
 use super::schema::{COMPRESSED_IMAGE, RAW_IMAGE, Topic};
 use super::wire::{Fields, Message, Value};
-use crate::model::{PixelFormat, RawFrame, Size};
+use crate::model::{DepthImage, PixelFormat, RawFrame, Size};
+use std::sync::Arc;
 
 /// Frame of reference that images and annotations name.
 pub(super) const CAMERA: &str = "camera";
 
 /// Longest side of a picture that is taken, px.
-const MAX_SIDE_PX: u32 = 1 << 15;
+pub(super) const MAX_SIDE_PX: u32 = 1 << 15;
 
 /// How the bytes of a [`Picture`] are to be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,6 +28,8 @@ pub struct Picture {
     pub sensor_time_ns: i64,
     pub encoding: Encoding,
     pub bytes: Vec<u8>,
+    /// The depth image that belongs to it.
+    pub depth: Option<Arc<DepthImage>>,
 }
 
 /// Name of the layout in [`RAW_IMAGE`].
@@ -98,12 +101,70 @@ pub(super) fn encode(raw: &RawFrame, log_time_ns: u64, into: &mut Vec<u8>) {
     }
 }
 
+/// Name of the layout of depth in [`RAW_IMAGE`].
+const DEPTH_NAME: &str = "16UC1";
+
+/// Puts a depth image into `into` as its message.
+pub(super) fn encode_depth(depth: &DepthImage, log_time_ns: u64, into: &mut Vec<u8>) {
+    into.clear();
+    into.reserve(depth.bytes() + 128);
+    let mut message = Message(into);
+    message.timestamp(1, log_time_ns);
+    message.text(7, CAMERA);
+    message.fixed32(2, depth.size.width);
+    message.fixed32(3, depth.size.height);
+    message.text(4, DEPTH_NAME);
+    message.fixed32(5, 2 * depth.size.width);
+    let mut bytes = Vec::with_capacity(depth.bytes());
+    for count in &depth.counts {
+        bytes.extend(count.to_le_bytes());
+    }
+    message.bytes(6, &bytes);
+}
+
+/// A depth image and the time that its message gives itself, ns.
+pub(super) struct DecodedDepth {
+    pub time_ns: Option<i64>,
+    pub image: DepthImage,
+}
+
+/// The depth image in a message of [`RAW_IMAGE`]; `None` if there is none that can be used.
+pub(super) fn decode_depth(message: &[u8]) -> Option<DecodedDepth> {
+    let raw = Raw::read(message)?;
+    let sides = 1..=MAX_SIDE_PX;
+    let is_depth = matches!(raw.name, DEPTH_NAME | "mono16");
+    if !is_depth || !sides.contains(&raw.width) || !sides.contains(&raw.height) {
+        return None;
+    }
+    let (line, height) = (2 * raw.width as usize, raw.height as usize);
+    let bytes = unpadded(raw.data?, raw.step.max(line), line, height);
+    let counts: Vec<u16> = bytes
+        .chunks_exact(2)
+        .map(|b| u16::from_le_bytes([b[0], b[1]]))
+        .collect();
+    let size = Size::new(raw.width, raw.height);
+    let image = DepthImage { size, counts };
+    let time_ns = raw.time_ns;
+    (image.counts.len() == size.area()).then_some(DecodedDepth { time_ns, image })
+}
+
 /// What a message holds.
 pub(super) struct Decoded {
     pub encoding: Encoding,
     /// The time that the message gives itself, ns.
     pub time_ns: Option<i64>,
     pub bytes: Vec<u8>,
+}
+
+impl Decoded {
+    pub fn new(encoding: Encoding, time_ns: i64, bytes: Vec<u8>) -> Self {
+        let time_ns = Some(time_ns);
+        Self {
+            encoding,
+            time_ns,
+            bytes,
+        }
+    }
 }
 
 /// The picture in a message of the schema; `None` if there is none that can be used.
@@ -146,22 +207,26 @@ struct Raw<'a> {
 }
 
 fn decode_raw(message: &[u8]) -> Option<Decoded> {
-    let mut raw = Raw::default();
-    for (field, value) in Fields(message) {
-        match (field, value) {
-            (1, Value::Bytes(t)) => raw.time_ns = timestamp(t),
-            (2, Value::Number(n)) => raw.width = u32::try_from(n).ok()?,
-            (3, Value::Number(n)) => raw.height = u32::try_from(n).ok()?,
-            (4, Value::Bytes(n)) => raw.name = std::str::from_utf8(n).ok()?,
-            (5, Value::Number(n)) => raw.step = n as usize,
-            (6, Value::Bytes(d)) => raw.data = Some(d),
-            _ => {}
-        }
-    }
-    raw.decoded()
+    Raw::read(message)?.decoded()
 }
 
-impl Raw<'_> {
+impl<'a> Raw<'a> {
+    fn read(message: &'a [u8]) -> Option<Self> {
+        let mut raw = Raw::default();
+        for (field, value) in Fields(message) {
+            match (field, value) {
+                (1, Value::Bytes(t)) => raw.time_ns = timestamp(t),
+                (2, Value::Number(n)) => raw.width = u32::try_from(n).ok()?,
+                (3, Value::Number(n)) => raw.height = u32::try_from(n).ok()?,
+                (4, Value::Bytes(n)) => raw.name = std::str::from_utf8(n).ok()?,
+                (5, Value::Number(n)) => raw.step = n as usize,
+                (6, Value::Bytes(d)) => raw.data = Some(d),
+                _ => {}
+            }
+        }
+        Some(raw)
+    }
+
     fn decoded(&self) -> Option<Decoded> {
         let data = self.data?;
         let format = format_of(self.name)?;

@@ -4,11 +4,14 @@
 //! A recording is written by [`Series`], which makes one file after another where a limit is set,
 //! and read by [`Reader`]. `docs/recordings.md` says what is in the files.
 
+mod channel;
 mod cursor;
 mod disk;
 mod error;
 mod image;
+mod pairing;
 mod reader;
+mod ros;
 mod scene;
 mod schema;
 mod series;

@@ -1,19 +1,23 @@
 //! Reads the frames of a recording, its own or another program's, in their order.
 
+use super::channel::{Channel, Role, camera_topic, is_registered};
 use super::cursor::Cursor;
 use super::error::RecordingError;
-use super::image::{Picture, decode};
+use super::image::{Decoded, Picture, decode, decode_depth};
+use super::pairing::Pairing;
+use super::ros::{self, Kind, Layout, ROS_UNIT_M, RosCamera};
 use super::schema::{
-    ABOUT, CAPTURED_AT, CLOCK, COMPRESSED_IMAGE, COUNTED, FILE_CLOCK, FIRST_SEQUENCE, NOTE,
-    RAW_IMAGE, SEQUENCE, SHIFT_NS,
+    ABOUT, CAPTURED_AT, CLOCK, COUNTED, DEPTH_CAMERA_PX, DEPTH_UNIT_M, FILE_CLOCK, FIRST_SEQUENCE,
+    NOTE, SEQUENCE, SHIFT_NS,
 };
 use super::walk::{Walk, read_up_to};
-use crate::model::{LocalTime, Origin, UserNote, UserNotes};
+use crate::model::{DepthImage, LocalTime, Origin, Pinhole, Size, UserNote, UserNotes};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Bytes of the footer with its head and the mark behind it.
 const FOOTER: u64 = 9 + 20 + 8;
@@ -24,11 +28,23 @@ const MAX_SUMMARY: u64 = 1 << 28;
 /// program's.
 pub type About = BTreeMap<String, String>;
 
-struct Channel {
-    topic: String,
-    schema: String,
-    /// It is one of ours, and whether its numbers are the driver's.
-    counted: Option<bool>,
+/// A depth image of a recording of ours, until its frame comes.
+struct OwnDepth {
+    publish_ns: u64,
+    image: Arc<DepthImage>,
+}
+
+/// What is known of another program's depth.
+#[derive(Default)]
+struct ForeignDepth {
+    /// The topic that is taken.
+    topic: Option<String>,
+    /// Cameras by topic.
+    cameras: BTreeMap<String, RosCamera>,
+    pairing: Pairing,
+    /// Frames of reference that depth and pictures name.
+    depth_frame: Option<String>,
+    picture_frame: Option<String>,
 }
 
 /// A recording that is being read.
@@ -47,6 +63,10 @@ pub struct Reader<R = File> {
     first_log_ns: Option<i64>,
     unreadable: u64,
     broken: Option<String>,
+    /// Depth images are taken.
+    wants_depth: bool,
+    own_depth: Option<OwnDepth>,
+    foreign_depth: ForeignDepth,
 }
 
 impl Reader {
@@ -90,6 +110,9 @@ impl<R: Read + Seek> Reader<R> {
             first_log_ns: None,
             unreadable: 0,
             broken: None,
+            wants_depth: true,
+            own_depth: None,
+            foreign_depth: ForeignDepth::default(),
         };
         let mut rest = Cursor(&summary);
         while let Some((kind, body)) = rest.record() {
@@ -98,7 +121,7 @@ impl<R: Read + Seek> Reader<R> {
         let foreign: BTreeSet<&str> = reader
             .channels
             .values()
-            .filter(|c| c.is_picture() && c.counted.is_none())
+            .filter(|c| c.role() == Role::Picture && c.counted.is_none())
             .map(|c| c.topic.as_str())
             .collect();
         if foreign.len() > 1 {
@@ -109,7 +132,80 @@ impl<R: Read + Seek> Reader<R> {
             );
             return Err(RecordingError::unusable(path, what));
         }
+        let depths = reader.depth_topics();
+        if depths.len() > 1 {
+            let what = format!(
+                "it has several series of depth ({}); keep the one that is registered with the \
+                 pictures, e.g. with `mcap filter -y TOPIC`",
+                depths.join(", ")
+            );
+            return Err(RecordingError::unusable(path, what));
+        }
         Ok(reader)
+    }
+
+    /// Topics of depth that may be taken: those that say to be registered with the pictures, if there
+    /// are such.
+    fn depth_topics(&self) -> Vec<&str> {
+        let of_depth = self.channels.values().filter(|c| c.role() == Role::Depth);
+        let mut topics: Vec<&str> = of_depth.map(|c| c.topic.as_str()).collect();
+        topics.sort_unstable();
+        topics.dedup();
+        if topics.iter().any(|topic| is_registered(topic)) {
+            topics.retain(|topic| is_registered(topic));
+        }
+        topics
+    }
+
+    /// Takes pictures alone from now on.
+    pub fn leave_depth_out(&mut self) {
+        self.wants_depth = false;
+    }
+
+    /// Whether there is depth that is wanted, as far as is known by now.
+    pub fn has_depth(&self) -> bool {
+        self.wants_depth && self.channels.values().any(|c| c.role() == Role::Depth)
+    }
+
+    /// Metres for each count of depth; `None` where the recording does not say.
+    pub fn depth_unit_m(&self) -> Option<f64> {
+        let is_ros = |c: &Channel| c.role() == Role::Depth && c.layout.is_some();
+        let of_ros = self.channels.values().any(is_ros).then_some(ROS_UNIT_M);
+        self.number(DEPTH_UNIT_M).or(of_ros)
+    }
+
+    /// The colour camera for pictures of this size; `None` where the recording does not say.
+    pub fn depth_camera(&self, picture: Size) -> Option<Pinhole> {
+        let mut own_px = [0.0; 4];
+        for (px, key) in own_px.iter_mut().zip(DEPTH_CAMERA_PX) {
+            *px = self.number(key).unwrap_or(0.0);
+        }
+        let own = Pinhole {
+            focal_px: [own_px[0], own_px[1]].into(),
+            middle_px: [own_px[2], own_px[3]].into(),
+        };
+        if own.is_valid() {
+            return Some(own);
+        }
+        let foreign = &self.foreign_depth;
+        let beside = foreign.topic.as_deref().and_then(camera_topic);
+        let of_pictures = self.chosen.as_deref().and_then(camera_topic);
+        let camera = [beside, of_pictures]
+            .into_iter()
+            .flatten()
+            .find_map(|topic| foreign.cameras.get(&topic));
+        camera.map(|camera| camera.for_size(picture))
+    }
+
+    /// The frames of reference of depth and pictures, where they are not the same: the depth is not
+    /// registered with the pictures.
+    pub fn depth_misfit(&self) -> Option<String> {
+        let foreign = &self.foreign_depth;
+        let (depth, picture) = (
+            foreign.depth_frame.as_ref()?,
+            foreign.picture_frame.as_ref()?,
+        );
+        (depth != picture).then(|| format!("{depth} and {picture}"))
     }
 
     /// What the recording says of itself; complete from the first picture on.
@@ -148,10 +244,10 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Pictures in the file, if it was ended properly.
     pub fn pictures_total(&self) -> Option<u64> {
-        let of_pictures = self
-            .counts
-            .iter()
-            .filter(|(id, _)| self.channels.get(id).is_some_and(Channel::is_picture));
+        let of_pictures = self.counts.iter().filter(|(id, _)| {
+            let channel = self.channels.get(id);
+            channel.is_some_and(|channel| channel.role() == Role::Picture)
+        });
         let total: u64 = of_pictures.map(|(_, count)| *count).sum();
         (total > 0).then_some(total)
     }
@@ -168,15 +264,19 @@ impl<R: Read + Seek> Reader<R> {
     /// name.
     pub fn next_picture(&mut self) -> Option<Picture> {
         loop {
+            if let Some(picture) = self.foreign_depth.pairing.ready() {
+                return Some(picture);
+            }
             let kind = match self.walk.next() {
-                Ok(kind) => kind?,
+                Ok(Some(kind)) => kind,
+                Ok(None) => return self.foreign_depth.pairing.oldest(),
                 Err(e) => {
                     self.broken = Some(e.to_string());
-                    return None;
+                    return self.foreign_depth.pairing.oldest();
                 }
             };
             if kind == op::MESSAGE {
-                if let Some(picture) = self.picture() {
+                if let Some(picture) = self.message() {
                     return Some(picture);
                 }
             } else {
@@ -186,14 +286,97 @@ impl<R: Read + Seek> Reader<R> {
         }
     }
 
-    /// The picture in the message that was just found, if it is one and wanted.
-    fn picture(&mut self) -> Option<Picture> {
+    /// The picture in the message that was just found, if it is one and wanted. Depth is kept for its
+    /// picture, and a picture of another program for its depth.
+    fn message(&mut self) -> Option<Picture> {
         let mut body = Cursor(self.walk.body());
         let head = MessageHead::read(&mut body)?;
-        let channel = self.channels.get(&head.channel)?;
-        if !channel.is_picture() {
-            return None;
+        let role = self.channels.get(&head.channel)?.role();
+        match role {
+            Role::Picture => {
+                let picture = self.picture(&head)?;
+                let is_own = self.channels.get(&head.channel)?.counted.is_some();
+                if is_own || !self.has_depth() {
+                    return Some(picture);
+                }
+                self.foreign_depth.pairing.picture(picture);
+            }
+            Role::Depth if self.wants_depth => self.depth(&head),
+            Role::Camera if self.wants_depth => self.camera(&head),
+            Role::Depth | Role::Camera | Role::Other => {}
         }
+        None
+    }
+
+    /// The content of the message that was just found.
+    fn content(&self) -> &[u8] {
+        let mut body = Cursor(self.walk.body());
+        MessageHead::read(&mut body).map_or(&[], |_| body.0)
+    }
+
+    /// Keeps a depth image.
+    fn depth(&mut self, head: &MessageHead) {
+        let Some(channel) = self.channels.get(&head.channel) else {
+            return;
+        };
+        if channel.is_own_depth() {
+            let decoded = decode_depth(self.content());
+            self.unreadable += u64::from(decoded.is_none());
+            self.own_depth = decoded.map(|decoded| OwnDepth {
+                publish_ns: head.publish_ns,
+                image: Arc::new(decoded.image),
+            });
+            return;
+        }
+        let topic = channel.topic.clone();
+        let chosen = self.depth_topics().first().map(|topic| (*topic).to_owned());
+        let chosen = self
+            .foreign_depth
+            .topic
+            .get_or_insert(chosen.unwrap_or_default());
+        if *chosen != topic {
+            return;
+        }
+        let read = match channel.layout {
+            Some(layout) => ros::depth(layout, self.content()).map(|read| TimedDepth {
+                time_ns: Some(read.stamp.time_ns),
+                frame: Some(read.stamp.frame_id),
+                image: read.image,
+            }),
+            None => decode_depth(self.content()).map(|read| TimedDepth {
+                time_ns: read.time_ns,
+                frame: None,
+                image: read.image,
+            }),
+        };
+        let Some(read) = read else {
+            self.unreadable += 1;
+            return;
+        };
+        let foreign = &mut self.foreign_depth;
+        let frame = read.frame.filter(|frame| !frame.is_empty());
+        foreign.depth_frame = foreign.depth_frame.take().or(frame);
+        let log_ns = i64::try_from(head.log_ns).ok();
+        if let Some(time_ns) = read.time_ns.filter(|ns| *ns != 0).or(log_ns) {
+            foreign.pairing.depth(time_ns, Arc::new(read.image));
+        }
+    }
+
+    /// Keeps a camera.
+    fn camera(&mut self, head: &MessageHead) {
+        let channel = self.channels.get(&head.channel);
+        let Some((channel, layout)) = channel.and_then(|c| Some((c, c.layout?))) else {
+            return;
+        };
+        if let Some(camera) = ros::camera(layout, self.content()) {
+            let topic = channel.topic.clone();
+            self.foreign_depth.cameras.entry(topic).or_insert(camera);
+        }
+    }
+
+    /// The picture in the message that was just found.
+    fn picture(&mut self, head: &MessageHead) -> Option<Picture> {
+        let channel = self.channels.get(&head.channel)?;
         let counted = channel.counted;
         if counted.is_none() {
             let chosen = self.chosen.get_or_insert_with(|| channel.topic.clone());
@@ -202,10 +385,23 @@ impl<R: Read + Seek> Reader<R> {
                 return None;
             }
         }
-        let Some(decoded) = decode(&channel.schema, body.0) else {
+        let content = self.content();
+        let decoded = match (channel.layout, Kind::of(&channel.schema)) {
+            (Some(layout), Some(kind)) => ros::picture(kind, layout, content).map(|read| {
+                let frame = Some(read.stamp.frame_id).filter(|frame| !frame.is_empty());
+                (
+                    Decoded::new(read.encoding, read.stamp.time_ns, read.bytes),
+                    frame,
+                )
+            }),
+            _ => decode(&channel.schema, content).map(|decoded| (decoded, None)),
+        };
+        let Some((decoded, frame)) = decoded else {
             self.unreadable += 1;
             return None;
         };
+        let foreign = &mut self.foreign_depth;
+        foreign.picture_frame = foreign.picture_frame.take().or(frame);
         let sensor_time_ns = match counted {
             Some(_) => self.sensor_time_ns(head.publish_ns)?,
             // What other programs mean by their times differs; the picture's own is the nearest to
@@ -220,11 +416,15 @@ impl<R: Read + Seek> Reader<R> {
         }
         let sequence = (counted == Some(true)).then(|| self.whole_sequence(head.number));
         self.sequence = sequence.or(self.sequence);
+        let own_depth = self.own_depth.take();
         Some(Picture {
             sequence,
             sensor_time_ns,
             encoding: decoded.encoding,
             bytes: decoded.bytes,
+            depth: own_depth
+                .filter(|depth| depth.publish_ns == head.publish_ns)
+                .map(|depth| depth.image),
         })
     }
 
@@ -272,7 +472,12 @@ impl<R: Read + Seek> Reader<R> {
         let (id, schema_id, topic, encoding) =
             (body.u16()?, body.u16()?, body.text()?, body.text()?);
         let metadata = body.map()?;
-        let known = if encoding == "protobuf" {
+        let layout = match encoding {
+            "ros1" => Some(Layout::Ros1),
+            "cdr" => Some(Layout::Ros2),
+            _ => None,
+        };
+        let known = if encoding == "protobuf" || layout.is_some() {
             self.schemas.get(&schema_id).cloned()
         } else {
             None
@@ -287,6 +492,7 @@ impl<R: Read + Seek> Reader<R> {
             Channel {
                 topic: topic.to_owned(),
                 schema,
+                layout,
                 counted,
             },
         );
@@ -376,10 +582,11 @@ impl MessageHead {
     }
 }
 
-impl Channel {
-    fn is_picture(&self) -> bool {
-        self.schema == COMPRESSED_IMAGE || self.schema == RAW_IMAGE
-    }
+/// A depth image of another program.
+struct TimedDepth {
+    time_ns: Option<i64>,
+    frame: Option<String>,
+    image: DepthImage,
 }
 
 /// The records at the end of a file that was ended properly.

@@ -11,6 +11,7 @@ pub(super) enum Topic {
     ImageUncounted,
     RawImage,
     RawImageUncounted,
+    Depth,
     Outline,
     Points,
     Tracks,
@@ -31,6 +32,9 @@ pub(super) struct Channel {
 pub(super) const COMPRESSED_IMAGE: &str = "foxglove.CompressedImage";
 pub(super) const RAW_IMAGE: &str = "foxglove.RawImage";
 
+/// Where depth images are, each before the frame that it belongs to and with its times.
+pub(super) const DEPTH_TOPIC: &str = "/camera/depth";
+
 /// Keys of a channel's metadata: what the header's `sequence` is, see [`COUNTED`] and
 /// [`UNCOUNTED`].
 pub(super) const SEQUENCE: &str = "sequence";
@@ -45,6 +49,10 @@ pub(super) const CLOCK: &str = "clock";
 /// [`CLOCK`] where the frames are those of a file, which were not filmed when they were recorded.
 pub(super) const FILE_CLOCK: &str = "file";
 pub(super) const CAPTURED_AT: &str = "captured_at";
+/// Metres for each count of the depth images, and the colour camera that they are registered with, px.
+pub(super) const DEPTH_UNIT_M: &str = "depth_unit_m";
+pub(super) const DEPTH_CAMERA_PX: [&str; 4] =
+    ["depth_fx_px", "depth_fy_px", "depth_cx_px", "depth_cy_px"];
 /// Begins the keys of the user's notes.
 pub(super) const NOTE: &str = "note.";
 
@@ -78,6 +86,11 @@ impl Topic {
             ),
             Topic::RawImage | Topic::RawImageUncounted => protobuf(
                 "/camera/image_raw",
+                RAW_IMAGE,
+                include_bytes!("foxglove/RawImage.bin"),
+            ),
+            Topic::Depth => protobuf(
+                DEPTH_TOPIC,
                 RAW_IMAGE,
                 include_bytes!("foxglove/RawImage.bin"),
             ),

@@ -1,11 +1,14 @@
 //! A recording: one file, or several in turn where a limit is set. Each file stands on its own.
 
 use super::error::RecordingError;
-use super::schema::{CAPTURED_AT, CLOCK, FIRST_SEQUENCE, NOTE, SHIFT_NS, Topic};
+use super::schema::{
+    CAPTURED_AT, CLOCK, DEPTH_CAMERA_PX, DEPTH_UNIT_M, FIRST_SEQUENCE, NOTE, SHIFT_NS, Topic,
+};
 use super::writer::{Times, Writer};
 use super::{image, scene};
 use crate::model::{
-    FormatNote, LocalTime, Origin, Outline, Pose, RawFrame, Size, Skeleton, TrackSet, nanoseconds,
+    DepthFormat, FormatNote, LocalTime, Origin, Outline, Pose, RawFrame, Size, Skeleton, TrackSet,
+    nanoseconds,
 };
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -28,6 +31,8 @@ pub struct Head {
     /// Of a camera, when the first frame was filmed is known only with that frame, see
     /// [`Series::set_captured_at`].
     pub origin: Origin,
+    /// Of the depth images beside the frames; `None` where there are none.
+    pub depth: Option<DepthFormat>,
 }
 
 /// When a file is ended and the next one begun.
@@ -187,8 +192,13 @@ impl Series {
             self.begin(clock, raw)?;
         }
         let times = clock.times(sensor_ns);
-        image::encode(raw, times.log, &mut self.buffer);
         let number = raw.sequence.unwrap_or(self.frames) as u32;
+        if let Some(depth) = &raw.depth {
+            image::encode_depth(depth, times.log, &mut self.buffer);
+            self.writer
+                .message(Topic::Depth, number, times, &self.buffer)?;
+        }
+        image::encode(raw, times.log, &mut self.buffer);
         self.writer
             .message(image::topic(raw), number, times, &self.buffer)?;
         if self.frames == 0 {
@@ -210,7 +220,7 @@ impl Series {
         let Some(start_ns) = self.part_start_ns else {
             return false;
         };
-        let bytes = self.writer.bytes() + raw.bytes.len() as u64;
+        let bytes = self.writer.bytes() + raw.all_bytes() as u64;
         let time_ns = u64::try_from(sensor_ns.saturating_sub(start_ns)).unwrap_or(0);
         self.limits.max_bytes.is_some_and(|max| bytes > max)
             || self.limits.max_time_ns.is_some_and(|max| time_ns >= max)
@@ -239,6 +249,14 @@ impl Series {
         ];
         if let Some(hz) = head.nominal_rate_hz {
             entries.push(("nominal_rate_hz", hz.to_string()));
+        }
+        if let Some(depth) = &head.depth {
+            let (focal_px, middle_px) = (depth.pinhole.focal_px, depth.pinhole.middle_px);
+            let camera_px = [focal_px.x, focal_px.y, middle_px.x, middle_px.y];
+            entries.push((DEPTH_UNIT_M, depth.unit_m.to_string()));
+            for (key, px) in DEPTH_CAMERA_PX.into_iter().zip(camera_px) {
+                entries.push((key, px.to_string()));
+            }
         }
         if let Some(number) = first.sequence {
             entries.push((FIRST_SEQUENCE, number.to_string()));

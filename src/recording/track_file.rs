@@ -5,7 +5,9 @@
 //! checksum and its bytes; a file that was cut anywhere is read up to its last whole record. All
 //! numbers are little-endian.
 
-use crate::model::{Agreement, Background, CameraMotion, Observation, TrackId, TrackSet};
+use crate::model::{
+    Agreement, Background, CameraMotion, DepthSeen, Observation, TrackId, TrackSet,
+};
 use nalgebra::{Similarity2, Vector2};
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufReader, BufWriter, Read, Write};
@@ -14,14 +16,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// What the file begins with: its kind and version.
-const MARK: [u8; 12] = *b"arborlog\x02\0\0\0";
+const MARK: [u8; 12] = *b"arborlog\x03\0\0\0";
 /// Bytes of the length and the checksum before each set.
 const RECORD_HEAD: usize = 4 + 4;
 /// Bytes of the head of a set (frame, time, lost, born, two counts), of the camera's motion (shift,
 /// turn, scale and how well it is known), and of one observation.
 const HEAD: usize = 8 + 8 + 4 + 4 + 4 + 4;
 const CAMERA: usize = 7 * 8;
-const OBSERVATION: usize = 21;
+const OBSERVATION: usize = 29;
 /// A longer record is damage, bytes: some millions of points in one frame.
 const LONGEST_RECORD: u32 = 1 << 28;
 const BUFFER: usize = 1 << 16;
@@ -280,6 +282,11 @@ fn encode(set: &TrackSet, out: &mut Vec<u8>) {
             out.extend(x.to_le_bytes());
         }
         out.push(u8::from(o.confirmed));
+        let (depth_m, sd_m) = o
+            .depth
+            .map_or((f32::NAN, f32::NAN), |d| (d.depth_m, d.sd_m));
+        out.extend(depth_m.to_le_bytes());
+        out.extend(sd_m.to_le_bytes());
     }
     for id in &set.rejected {
         out.extend(id.0.to_le_bytes());
@@ -376,8 +383,8 @@ fn decode(bytes: &[u8]) -> Option<TrackSet> {
 }
 
 fn observation(bytes: &[u8]) -> Observation {
-    let [u_px, v_px, fb_error_px, error_px] =
-        [4, 8, 12, 16].map(|at| f32::from_bits(u32_at(bytes, at)));
+    let [u_px, v_px, fb_error_px, error_px, depth_m, sd_m] =
+        [4, 8, 12, 16, 21, 25].map(|at| f32::from_bits(u32_at(bytes, at)));
     Observation {
         id: TrackId(u32_at(bytes, 0)),
         u_px,
@@ -385,6 +392,7 @@ fn observation(bytes: &[u8]) -> Observation {
         fb_error_px,
         error_px: (!error_px.is_nan()).then_some(error_px),
         confirmed: bytes[20] != 0,
+        depth: (!depth_m.is_nan()).then_some(DepthSeen { depth_m, sd_m }),
     }
 }
 
@@ -411,6 +419,10 @@ mod tests {
             fb_error_px: 0.125,
             error_px: (k > 20).then_some(k as f32),
             confirmed: k.is_multiple_of(2),
+            depth: k.is_multiple_of(3).then_some(DepthSeen {
+                depth_m: 2.0 + k as f32,
+                sd_m: 0.01,
+            }),
         };
         let observations = (0..n).map(at).collect();
         let rejected = (0..n / 20).map(TrackId).collect();

@@ -4,6 +4,7 @@ use super::meter::Histogram;
 use super::shared::Failure;
 use crate::cancel::CancelToken;
 use crate::config::Config;
+use crate::depth;
 use crate::document::{CAMERA_FILE, CameraCsv, LEFT_OUT_FILE, MotionCsv, TRACKS_FILE, TracksCsv};
 use crate::files::OutputFolder;
 use crate::model::{LONGEST_TRIAL_S, Pose, TrackId, TrackLog, TrackSet};
@@ -89,8 +90,9 @@ impl CaptureTables {
             config.export.metres_per_px,
         )?;
         let camera = CameraCsv::new(folder.file(CAMERA_FILE)?, model.skeleton.image_size)?;
-        let tracks = TracksCsv::new(folder.file(TRACKS_FILE)?)?;
-        let left_out = TracksCsv::of_left_out(folder.file(LEFT_OUT_FILE)?)?;
+        let has_depth = depth::format(&config.depth).is_some();
+        let tracks = TracksCsv::new(folder.file(TRACKS_FILE)?, has_depth)?;
+        let left_out = TracksCsv::of_left_out(folder.file(LEFT_OUT_FILE)?, has_depth)?;
         Ok(Self {
             folder,
             replay: PoseReplay::new(model, config),
@@ -180,7 +182,7 @@ impl CaptureTables {
                 &mut self.tracks
             };
             let node = self.replay.node_name_of(o.id);
-            table.row(o.id, set.frame, set.time_s, set.filmed_px(o), node)?;
+            table.row(set, o, node)?;
         }
         Ok(())
     }

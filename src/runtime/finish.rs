@@ -7,13 +7,14 @@ use super::meter::Histogram;
 use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
+use crate::depth;
 use crate::document::note::{
     BarkNote, Build, MasksNote, ModelNote, OutlineNote, PictureNote, Quality as QualityNote,
     Refinement, Software, Source, json,
 };
 use crate::document::{
-    BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, LEAVES_MASK_FILE, MotionCsv, PICTURE_FILE,
-    REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
+    BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, DepthNote, LEAVES_MASK_FILE, MotionCsv,
+    PICTURE_FILE, REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
 };
 use crate::dynamics::{Depth, Film, Take};
 use crate::files::OutputFolder;
@@ -297,7 +298,9 @@ fn without_tree(job: &CaptureJob, dir: &Path) -> Result<Written, Failure> {
     let folder = OutputFolder::create(dir)?;
     let metres_per_px = job.config.export.metres_per_px;
     let camera = CameraCsv::new(folder.file(CAMERA_FILE)?, job.info.size)?;
-    write_tracks(job, TracksCsv::new(folder.file("tracks.csv")?)?, camera)?;
+    let has_depth = depth::format(&job.config.depth).is_some();
+    let tracks = TracksCsv::new(folder.file("tracks.csv")?, has_depth)?;
+    write_tracks(job, tracks, camera)?;
     let foot_only = Arc::new(Skeleton {
         nodes: Vec::new(),
         foot_px: Point2::origin(),
@@ -386,6 +389,7 @@ pub(super) fn describe(
             time_s: p.time_s,
         }),
         tag: job.tag,
+        depth: tree.and_then(depth_note),
         leaves: None,
         scan: None,
         bark: tree.and_then(bark_of).map(|_| BarkNote {
@@ -405,6 +409,18 @@ pub(super) fn describe(
         animation: None,
         warnings: warnings(job, tree),
     }
+}
+
+/// `None` in a film without depth.
+fn depth_note(tree: &Model) -> Option<DepthNote> {
+    let depths = tree.depths.as_ref()?;
+    Some(DepthNote {
+        foot_m: depths.foot_m,
+        metres_per_px: depths.metres_per_px,
+        points: depths.tracks.len() as u64,
+        nodes: tree.seen.len().saturating_sub(1) as u64,
+        nodes_seen: tree.seen.iter().flatten().count() as u64,
+    })
 }
 
 fn count(counter: &AtomicU64) -> u64 {

@@ -15,6 +15,7 @@ mod announce;
 mod asked;
 mod background;
 mod capture_tables;
+mod depth_scale;
 mod finish;
 mod first_picture;
 mod job;
@@ -62,6 +63,7 @@ pub use unfinished::{finish_unfinished, unfinished_dir};
 pub use watched::open;
 
 use crate::config::Config;
+use crate::depth;
 use crate::model::{Control, Origin, Outline, Snapshot};
 use crate::outline::{Given, Scribbles};
 use crate::pipeline::{DecodeStage, FrontEnd};
@@ -103,6 +105,7 @@ pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> 
         notes: job.notes.clone(),
     });
     let info = source.describe();
+    job.config.depth = depth::settings_of_run(&job.config.depth, info.depth.as_ref());
     let (frames_in, frames_out) = bounded(FRAME_QUEUE);
     let (model_in, model_out) = bounded(MODEL_QUEUE);
     // Wishes are typed by a person; they cannot pile up.

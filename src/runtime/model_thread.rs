@@ -4,6 +4,7 @@
 use super::announce::Announced;
 use super::background::{Background, Beside, Pending};
 use super::capture_tables::CaptureTables;
+use super::depth_scale::take_scale_of_depth;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
 use super::judge::judge;
@@ -198,6 +199,13 @@ impl ModelThread {
         self.tag = Some(scale);
     }
 
+    fn take_scale_of_depth(&mut self) {
+        let said = take_scale_of_depth(&mut self.job.config, self.back.model().map(|m| &**m));
+        if let Some(said) = said {
+            self.shared.tell(said);
+        }
+    }
+
     /// Markers were found, or one was picked: the capture is to name them.
     fn take_markers(&mut self, markers: Vec<MarkerWindow>) {
         let n = markers.len();
@@ -258,6 +266,7 @@ impl ModelThread {
         // No frame is left that could need what is under way.
         self.refining.give_up();
         self.back.finish(&self.shared.pulse.optional_work);
+        self.take_scale_of_depth();
         if self.back.has_unused_strokes() {
             self.shared.warn(STROKES_TOO_LATE.into());
         }
@@ -274,6 +283,7 @@ impl ModelThread {
             self.job.pace == Pace::Live,
         );
         let moved = self.back.step(followed);
+        self.take_scale_of_depth();
         if !hurry {
             self.refining.begin(&self.back);
         }
@@ -482,6 +492,7 @@ impl ModelThread {
         let mut config = reloaded.unwrap_or_else(|| self.job.config.clone());
         config.export.metres_per_px = self.job.config.export.metres_per_px;
         config.markers.windows = self.job.config.markers.windows.clone();
+        config.depth = self.job.config.depth.clone();
         config.skeleton.strokes_px = self.back.strokes_px().to_vec();
         config
     }

@@ -127,7 +127,7 @@ impl Recorder {
 
     /// Offers a frame with its place in the capture.
     pub fn offer(&self, raw: &Arc<RawFrame>, index: u64) {
-        let bytes = raw.bytes.len();
+        let bytes = raw.all_bytes();
         while !self.live && self.is_full(bytes) && !self.shared.stopped() {
             std::thread::sleep(NAP);
         }
@@ -248,7 +248,7 @@ impl Thread {
                 };
                 let failed = self.broken || done.is_err();
                 self.note(done);
-                self.waiting.fetch_sub(raw.bytes.len(), Ordering::Relaxed);
+                self.waiting.fetch_sub(raw.all_bytes(), Ordering::Relaxed);
                 let counts = &self.shared.counts;
                 let count = if failed {
                     &counts.not_recorded
@@ -327,6 +327,7 @@ mod tests {
                 size,
                 format: PixelFormat::Grey,
                 bytes: vec![index as u8; size.area()],
+                depth: None,
             };
             recorder.offer(&Arc::new(raw), index);
         }

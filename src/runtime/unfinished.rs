@@ -5,6 +5,7 @@
 //! or by a full disk is completed from there.
 
 use super::announce::Announced;
+use super::depth_scale::take_scale_of_depth;
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
@@ -270,6 +271,8 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     back.finish(cancel);
     Announced::default().tell_of_wood(back.wood_sight(), true, &shared);
     let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
+    let mut config = note.config;
+    take_scale_of_depth(&mut config, back.model().map(|model| &**model));
     let job = CaptureJob {
         tree: back.model().cloned(),
         outline: back.outline().cloned(),
@@ -278,7 +281,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         wood: back.wood().clone(),
         asked: back.asked().clone(),
         info,
-        config: note.config,
+        config,
         quality,
         picture,
         tag: note.tag,
@@ -321,5 +324,6 @@ fn info_of(note: &CaptureNote) -> SourceInfo {
         nominal_rate_hz: note.timing.nominal_rate_hz,
         frames_total: None,
         live: false,
+        depth: None,
     }
 }

@@ -7,7 +7,7 @@
 //! device and ends when its call returns; nobody waits for it, not even the end of the program.
 
 use super::nap::NAP;
-use crate::config;
+use crate::config::{self, Config};
 use crate::model::RawFrame;
 use crate::source::{self, Health, Source, SourceError, SourceInfo, Successor};
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
@@ -34,14 +34,14 @@ const LEFT_BEHIND: usize = 8;
 /// As those of [`source::open`], or the camera has not been opened in time.
 pub fn open(
     input: &Path,
-    config: &config::Camera,
+    config: &Config,
     fps: Option<f64>,
 ) -> Result<Box<dyn Source>, SourceError> {
     if input.is_file() || input.is_dir() {
         return source::open(input, config, fps);
     }
     let name = input.display().to_string();
-    let limit = config.time_limit() * OPENING_LIMITS;
+    let limit = config.camera.time_limit() * OPENING_LIMITS;
     let (opened_in, opened) = bounded(0);
     let (path, config) = (input.to_owned(), config.clone());
     let started = std::thread::Builder::new()
@@ -429,6 +429,7 @@ mod tests {
                 size,
                 format,
                 bytes: vec![0; 4],
+                depth: None,
             }))
         }
 
@@ -441,6 +442,7 @@ mod tests {
                 nominal_rate_hz: None,
                 frames_total: None,
                 live: true,
+                depth: None,
             }
         }
 

@@ -3,7 +3,7 @@
 
 use crate::bounds::Bounds;
 use crate::config::EnvelopeKind;
-use crate::model::Outline;
+use crate::model::{NodeDepth, Outline};
 use crate::signal::convex_hull;
 use nalgebra::{Point2, Point3};
 
@@ -21,6 +21,8 @@ pub struct Envelope {
     discs: Vec<Disc>,
     /// Stretches of x of every disc that are inside, from left to right; empty: all is.
     stretches: Vec<Vec<Bounds>>,
+    /// Where a depth camera has seen measured nodes; empty: nowhere.
+    seen: Vec<Option<NodeDepth>>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +97,7 @@ impl Envelope {
             bottom_y: bottom,
             discs,
             stretches: Vec::new(),
+            seen: Vec::new(),
         }
     }
 
@@ -112,11 +115,26 @@ impl Envelope {
         }
     }
 
+    /// The same where a depth camera has seen measured nodes: a node may be where it was seen, though
+    /// that is outside.
+    pub fn with_seen(self, seen: &[Option<NodeDepth>]) -> Self {
+        Self {
+            seen: seen.to_vec(),
+            ..self
+        }
+    }
+
+    /// Where a depth camera has seen the measured node `i`; `None` where it has not, and for copies.
+    pub fn seen(&self, i: usize) -> Option<NodeDepth> {
+        self.seen.get(i).copied().flatten()
+    }
+
     fn empty() -> Self {
         Self {
             bottom_y: 0.0,
             discs: Vec::new(),
             stretches: Vec::new(),
+            seen: Vec::new(),
         }
     }
 
@@ -147,6 +165,7 @@ impl Envelope {
             bottom_y: foot_px.y - f64::from(bottom),
             discs,
             stretches: Vec::new(),
+            seen: Vec::new(),
         }
     }
 

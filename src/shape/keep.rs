@@ -101,6 +101,11 @@ pub(super) fn carry_over_positions(
                 drawn_in(built, built + way, envelope)
             }
         };
+        // What a depth camera has seen since says more than where it stood.
+        let place = match envelope.seen(i) {
+            Some(_) => Point3::new(place.x, place.y, built.z),
+            None => place,
+        };
         if stood[i].is_some() && (stays[i] || !copy) {
             held[i] = Some(place);
         }

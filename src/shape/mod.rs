@@ -41,7 +41,7 @@ pub use limbs::{limbs, thicken};
 pub use measure::{PushFigures, side_symmetry};
 pub use okabe::set_depths_apart;
 pub use planes::copy_to_planes;
-pub use prototype::{Prototype, Tuned, build, build_like};
+pub use prototype::{Prototype, Tuned, build, build_like, build_seen};
 pub use push::{PositionPrior, Terms, envelope_distance, push, push_on};
 pub use radius::{PIPE_EXPONENTS, TIP_RADIUS_PX};
 pub use room::{Silhouette, room};

@@ -24,6 +24,7 @@ pub fn copy_to_planes(
     let foot_px = flat.first().map_or(Point2::origin(), |n| n.position_px);
     let mut nodes = measured_nodes(flat, tracks, foot_px);
     place(&mut nodes, envelope);
+    lean_as_seen(&mut nodes, trunk, envelope);
     let axes = axes(&nodes, trunk);
     let measured = nodes.len();
     for plane in 1..planes {
@@ -89,7 +90,7 @@ fn axes(nodes: &[Node], trunk: &[bool]) -> Vec<Vector3<f64>> {
     let mut axes: Vec<Vector3<f64>> = Vec::with_capacity(nodes.len());
     for node in nodes {
         let parent = node.parent.map_or(0, |p| p.index());
-        let leaves = Vector3::new(nodes[parent].position.x, 0.0, 0.0);
+        let leaves = Vector3::new(nodes[parent].position.x, 0.0, nodes[parent].position.z);
         let axis = match axes.get(parent) {
             Some(&below) if !in_trunk(trunk, parent) => below,
             _ => leaves,
@@ -97,6 +98,15 @@ fn axes(nodes: &[Node], trunk: &[bool]) -> Vec<Vector3<f64>> {
         axes.push(axis);
     }
     axes
+}
+
+/// Leans the trunk towards the viewer or away as a depth camera has seen it, with all that grows on it.
+fn lean_as_seen(nodes: &mut [Node], trunk: &[bool], envelope: &Envelope) {
+    for i in 1..nodes.len() {
+        let below_z = nodes[i].parent.map_or(0.0, |p| nodes[p.index()].position.z);
+        let seen = envelope.seen(i).filter(|_| in_trunk(trunk, i));
+        nodes[i].position.z = seen.map_or(below_z, |seen| seen.z_px);
+    }
 }
 
 /// Brings the measured nodes into the envelope, the foot to the origin, and what has no place to

@@ -6,7 +6,7 @@ use super::push::{Terms, push};
 use super::term_weights::tune_term_weights;
 use super::trunk::trunk;
 use crate::config;
-use crate::model::{Outline, Skeleton};
+use crate::model::{NodeDepth, Outline, Skeleton};
 use crate::skeleton::Node2d;
 use nalgebra::{Point2, Point3};
 
@@ -19,6 +19,20 @@ pub fn build(
     settings: &config::Shape,
 ) -> Skeleton {
     Tuned::of(flat, tracks, outline, settings).skeleton
+}
+
+/// As [`build`], of a tree of which a depth camera has seen the nodes of `flat` at these `depths`; they
+/// may be fewer than the nodes.
+pub fn build_seen(
+    flat: &[Node2d],
+    tracks: &[u32],
+    outline: &Outline,
+    settings: &config::Shape,
+    depths: &[Option<NodeDepth>],
+) -> Skeleton {
+    let mut it = Prototype::seen(flat, tracks, outline, settings, depths);
+    tune_term_weights(&mut it.skeleton, &it.trunk, &it.envelope, settings);
+    it.skeleton
 }
 
 /// A tree in space, and what it was pushed by.
@@ -77,12 +91,24 @@ impl Prototype {
         outline: &Outline,
         settings: &config::Shape,
     ) -> Self {
+        Self::seen(flat, tracks, outline, settings, &[])
+    }
+
+    /// The same of a tree of which a depth camera has seen nodes.
+    pub fn seen(
+        flat: &[Node2d],
+        tracks: &[u32],
+        outline: &Outline,
+        settings: &config::Shape,
+        depths: &[Option<NodeDepth>],
+    ) -> Self {
         let foot_px = flat.first().map_or(Point2::origin(), |n| n.position_px);
         let places: Vec<Point3<f64>> = flat
             .iter()
             .map(|n| model_from_image(n.position_px, foot_px))
             .collect();
         let envelope = Envelope::of_filmed(settings.envelope, outline, foot_px, &places);
+        let envelope = envelope.with_seen(depths);
         let leader_px: Vec<Point2<f64>> = settings
             .leader_px
             .iter()

@@ -49,6 +49,9 @@ impl Terms {
 /// in [-delta, delta], with delta a share of the tree's width. No node is pushed out of the
 /// envelope, and none for which `trunk` holds is pushed.
 ///
+/// Where a depth camera has seen a node, that is a normal likelihood of its place, one more factor of
+/// eq. 2, and the push that brings it there is one of the options, inside of the envelope or not.
+///
 /// The paper does this once. From the second traversal on (`settings.passes`) the rest of the tree
 /// stands, so that the angles of the branches which leave from the node count as well, and a push
 /// is measured in a tree without gaps that are filled later.
@@ -176,11 +179,13 @@ impl Step<'_> {
     }
 }
 
-/// One push that was tried: its length, ln of eq. 4 and of the prior, and E of eq. 6.
+/// One push that was tried: its length, ln of eq. 4, of the prior and of what a depth camera has
+/// seen, and E of eq. 6.
 struct Candidate {
     push: f64,
     local: f64,
     prior: f64,
+    seen: f64,
     gain: f64,
 }
 
@@ -279,7 +284,23 @@ impl<'a> Pusher<'a> {
             pushes.push(step.at);
         }
         pushes.retain(|push| *push == step.at || self.is_possible(step, *push));
+        pushes.extend(self.push_to_seen(step));
         pushes
+    }
+
+    /// The push that brings the node to where a depth camera has seen it, px. Measured nodes are in the
+    /// plane of the picture, whose normal is the line of sight.
+    fn push_to_seen(&self, step: &Step) -> Option<f64> {
+        let seen = self.envelope.seen(step.node)?;
+        Some(step.at + seen.z_px - self.skeleton.nodes[step.node].position.z)
+    }
+
+    /// ln of how likely the node is where a depth camera has seen it, if it is moved by `offset`.
+    fn ln_seen(&self, step: &Step, offset: Vector3<f64>) -> f64 {
+        self.envelope.seen(step.node).map_or(0.0, |seen| {
+            let z_px = self.skeleton.nodes[step.node].position.z + offset.z;
+            -0.5 * ((z_px - seen.z_px) / seen.sd_px).powi(2)
+        })
     }
 
     /// The tree without what is moved, and what that may come near to on its way.
@@ -301,6 +322,7 @@ impl<'a> Pusher<'a> {
                 push,
                 local: self.ln_likelihood(step, offset),
                 prior: self.ln_prior(step.moved, offset),
+                seen: self.ln_seen(step, offset),
                 gain: (before - distance).max(0.0),
             });
         }
@@ -447,7 +469,7 @@ impl Posterior {
             Terms::Global => 0.0,
             Terms::Local | Terms::Both { .. } => option.local,
         };
-        global + option.prior + local
+        global + option.prior + option.seen + local
     }
 }
 

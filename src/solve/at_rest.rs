@@ -134,6 +134,7 @@ mod tests {
                     fb_error_px: 0.0,
                     error_px: None,
                     confirmed: true,
+                    depth: None,
                 }
             };
             log.push(TrackSet {

@@ -1,22 +1,24 @@
 //! From the hierarchy to the tree in space, with its radii.
 
 use crate::config::Config;
-use crate::model::{Foot, MotionHierarchy, Outline, Skeleton};
+use crate::model::{Foot, MotionHierarchy, NodeDepth, Outline, Skeleton};
 use crate::{shape, skeleton};
 use nalgebra::Point2;
 
 /// Share of the outline's width at the foot that is trunk, where none can be measured above it.
 const TRUNK_SHARE: f64 = 0.5;
 
-/// Hierarchy to tree in space, with its thickness; the foot of its trunk is at `foot_px`.
+/// Hierarchy to tree in space, with its thickness; the foot of its trunk is at `foot_px`. `depths` has
+/// where a depth camera has seen each of the flat nodes, and may be empty.
 pub fn lift_to_3d(
     hierarchy: &MotionHierarchy,
     foot_px: Point2<f64>,
     outline: &Outline,
+    depths: &[Option<NodeDepth>],
     config: &Config,
 ) -> Skeleton {
     let (flat, tracks) = flat(hierarchy, foot_px, config);
-    let mut skeleton = shape::build(&flat, &tracks, outline, &config.shape);
+    let mut skeleton = shape::build_seen(&flat, &tracks, outline, &config.shape, depths);
     assign_radii(&mut skeleton, outline, config);
     skeleton
 }

@@ -9,8 +9,8 @@ use super::taper::taper;
 use crate::config::{Affinity, Config};
 use crate::hierarchy::Evidence;
 use crate::model::{
-    BranchGraph, Foot, LogWindow, MotionHierarchy, NodeId, Outline, Skeleton, Swaying, TrackId,
-    TrackTable, TreeMode, Wood,
+    BranchGraph, Foot, LogWindow, MotionHierarchy, NodeDepth, NodeId, Outline, RestDepths,
+    Skeleton, Swaying, TrackId, TrackTable, TreeMode, Wood,
 };
 use crate::motion::Binding;
 use crate::shape::PushFigures;
@@ -37,6 +37,10 @@ pub struct Model {
     pub tree_modes: Vec<TreeMode>,
     /// Rest position of every track that was there when the tree was built, px.
     pub rest_px: BTreeMap<TrackId, Point2<f64>>,
+    /// What a depth camera has seen of the tree; `None` in a film without depth.
+    pub depths: Option<Arc<RestDepths>>,
+    /// Where it has seen each node of [`flat`](Self::flat); empty likewise.
+    pub seen: Vec<Option<NodeDepth>>,
     /// Tracks that the tree was not built from, with node and rest place, px: those of an older
     /// tree, and those that were found since.
     pub joined: BTreeMap<TrackId, (NodeId, Point2<f64>)>,
@@ -119,6 +123,7 @@ impl Model {
         binding.inherit(&moved_to(&self.joined, &places));
         binding.inherit(&moved_to(&self.on_sub_branches(), &places));
         binding.leave_out(&self.left_out);
+        binding.see_depths(self.depths.clone());
         binding
     }
 

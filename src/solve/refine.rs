@@ -204,7 +204,13 @@ impl<'a> Refinement<'a> {
         let anew = on_foot((*model.plain).clone(), old.foot_px);
         let twins = twins(&anew, old, &matches);
         let (flat, tracks) = model.flat(self.config);
-        let prototype = Prototype::of(&flat, &tracks, &model.outline_at_rest, &self.config.shape);
+        let prototype = Prototype::seen(
+            &flat,
+            &tracks,
+            &model.outline_at_rest,
+            &self.config.shape,
+            &model.seen,
+        );
         let (mut skeleton, _) = go_on(&anew, old, &twins, &prototype, &self.config.shape);
         // Twigs, and with them the pipes, follow from how far the branches reach.
         assign_radii(&mut skeleton, &model.outline_at_rest, self.config);

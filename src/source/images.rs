@@ -97,6 +97,7 @@ impl Source for Images {
             nominal_rate_hz: Some(self.rate_hz),
             frames_total: Some(self.files.len() as u64),
             live: false,
+            depth: None,
         }
     }
 }
@@ -122,6 +123,7 @@ fn read(path: &Path, sequence: u64, sensor_time_s: f64) -> Result<RawFrame, Sour
         size,
         format,
         bytes,
+        depth: None,
     })
 }
 

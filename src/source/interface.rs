@@ -3,7 +3,7 @@
 use super::clock::ClockKind;
 use super::error::SourceError;
 use crate::config;
-use crate::model::{FormatNote, Origin, RawFrame, Size};
+use crate::model::{DepthFormat, FormatNote, Origin, RawFrame, Size};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -19,6 +19,8 @@ pub struct SourceInfo {
     pub frames_total: Option<u64>,
     /// A live source does not wait for its reader; any other does.
     pub live: bool,
+    /// Of the depth images beside its pictures; `None` where there are none.
+    pub depth: Option<DepthFormat>,
 }
 
 /// What a source knows beyond its frames. The counts only ever grow.

@@ -4,9 +4,12 @@
 //! A source hands frames out as they left the camera or the file, with their own number and time;
 //! [`Decoder`] turns them into the pictures that the tracker and the screen want.
 
+mod camera_file;
 mod choice;
 mod clock;
 mod decode;
+mod depth_format;
+mod depth_tally;
 mod devices;
 mod error;
 mod identity;
@@ -17,11 +20,13 @@ mod opened;
 mod photograph;
 mod probe;
 mod recording;
+mod rgbd_folder;
 #[cfg(feature = "nokhwa")]
 mod through_nokhwa;
 mod v4l2;
 mod video;
 
+pub use camera_file::{CameraFile, CameraFileError};
 pub use choice::Mode;
 pub use clock::ClockKind;
 pub use decode::{DecodeError, Decoder};
@@ -32,7 +37,7 @@ pub use interface::{Health, Source, SourceInfo, Successor};
 pub use loopback::Loopback;
 pub use photograph::{Photograph, PhotographError, image_format};
 
-use crate::config;
+use crate::config::{self, Config};
 use std::os::unix::fs::FileTypeExt;
 use std::path::Path;
 
@@ -43,7 +48,7 @@ use std::path::Path;
 /// There is nothing that can be read as frames; the error says why and what to do.
 pub fn open(
     input: &Path,
-    config: &config::Camera,
+    config: &Config,
     fps: Option<f64>,
 ) -> Result<Box<dyn Source>, SourceError> {
     let name = input.display().to_string();
@@ -58,7 +63,12 @@ pub fn open(
         .map_err(|e| SourceError::of_file(input, &e))?
         .file_type();
     if kind.is_char_device() {
-        open_camera(input, config)
+        open_camera(input, &config.camera)
+    } else if kind.is_dir() && rgbd_folder::is_one(input) {
+        Ok(Box::new(rgbd_folder::RgbdFolder::open(
+            input,
+            &config.depth,
+        )?))
     } else if kind.is_dir() {
         Ok(Box::new(images::Images::open(input, fps.unwrap_or(30.0))?))
     } else if !kind.is_file() {
@@ -68,7 +78,7 @@ pub fn open(
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     {
-        Ok(Box::new(recording::Recording::open(input)?))
+        Ok(Box::new(recording::Recording::open(input, &config.depth)?))
     } else {
         Ok(Box::new(video::Video::open(input)?))
     }
@@ -92,16 +102,14 @@ fn open_camera(path: &Path, config: &config::Camera) -> Result<Box<dyn Source>, 
 #[cfg(all(test, not(feature = "nokhwa")))]
 mod tests {
     use super::*;
-    use crate::config::{Backend, Config};
+    use crate::config::Backend;
 
     #[test]
     fn a_backend_that_was_left_out_is_named() {
-        let camera = config::Camera {
-            backend: Backend::Nokhwa,
-            ..Config::default().camera
-        };
+        let mut wanted = Config::default();
+        wanted.camera.backend = Backend::Nokhwa;
         // Any character device; it is not even opened.
-        let refused = open(Path::new("/dev/null"), &camera, None).err();
+        let refused = open(Path::new("/dev/null"), &wanted, None).err();
         let said = refused.map(|e| e.to_string()).unwrap_or_default();
         assert!(
             said.contains("\"nokhwa\" was left out of this build"),

@@ -31,6 +31,7 @@ pub(super) fn describe(
         nominal_rate_hz: granted.rate_hz,
         frames_total: None,
         live: true,
+        depth: None,
     }
 }
 

@@ -1,12 +1,18 @@
 //! A recording as a source: its own frames, numbers and times.
 
+use super::depth_format::{SaidOfDepth, check_view};
+use super::depth_tally::DepthTally;
 use super::error::SourceError;
 use super::images::picture;
 use super::interface::{Source, SourceInfo};
-use crate::model::{FormatNote, Origin, PixelFormat, RawFrame, Size, seconds};
+use crate::config;
+use crate::model::{DepthFormat, FormatNote, Origin, PixelFormat, RawFrame, Size, seconds};
 use crate::recording::{Encoding, Picture, Reader, RecordingError};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+
+/// So many frames are looked at for the camera of their depth.
+const FRAMES_FOR_CAMERA: usize = 8;
 
 /// A recording that is being read.
 pub(super) struct Recording {
@@ -21,12 +27,15 @@ pub(super) struct Recording {
     out_of_order: u64,
     unreadable: u64,
     ended: bool,
+    /// `None` where it has no depth, or none is wanted.
+    depth: Option<DepthFormat>,
+    tally: DepthTally,
 }
 
 impl Recording {
-    pub(super) fn open(path: &Path) -> Result<Self, SourceError> {
+    pub(super) fn open(path: &Path, settings: &config::Depth) -> Result<Self, SourceError> {
         let input = path.display().to_string();
-        let reader = Reader::open(path).map_err(|e| match e {
+        let mut reader = Reader::open(path).map_err(|e| match e {
             RecordingError::Unreadable { source, .. } => SourceError::of_file(path, &source),
             RecordingError::Unusable { what, .. } => SourceError::BadFormat {
                 input: input.clone(),
@@ -37,6 +46,9 @@ impl Recording {
                 what: other.to_string(),
             },
         })?;
+        if !settings.read {
+            reader.leave_depth_out();
+        }
         let mut recording = Self {
             path: path.to_owned(),
             reader,
@@ -47,8 +59,10 @@ impl Recording {
             out_of_order: 0,
             unreadable: 0,
             ended: false,
+            depth: None,
+            tally: DepthTally::default(),
         };
-        while recording.pending.len() < 2
+        while recording.pending.len() < recording.frames_at_first()
             && let Some(frame) = recording.read_frame()
         {
             recording.pending.push_back(frame);
@@ -56,7 +70,10 @@ impl Recording {
         match recording.pending.len() {
             0 => {}
             1 => return Err(SourceError::SingleFrame { input }),
-            _ => return Ok(recording),
+            _ => {
+                recording.take_depth(settings)?;
+                return Ok(recording);
+            }
         }
         let mut what = "no picture in it can be read".to_owned();
         let topics = recording.reader.topics();
@@ -72,6 +89,38 @@ impl Recording {
         Err(SourceError::BadFormat { input, what })
     }
 
+    /// So many frames are read before the first is given out: two, more while the camera of their depth
+    /// is not known.
+    fn frames_at_first(&self) -> usize {
+        let waits = self.size.is_some_and(|size| {
+            self.reader.has_depth() && self.reader.depth_camera(size).is_none()
+        });
+        if waits { FRAMES_FOR_CAMERA } else { 2 }
+    }
+
+    fn take_depth(&mut self, settings: &config::Depth) -> Result<(), SourceError> {
+        let Some(size) = self.size.filter(|_| self.reader.has_depth()) else {
+            return Ok(());
+        };
+        if let Some(frames) = self.reader.depth_misfit() {
+            let what = format!(
+                "its depth is not registered with its pictures (frames {frames}); record the depth that \
+                 is, e.g. aligned_depth_to_color, or give --no-depth"
+            );
+            return Err(SourceError::bad_format(&self.path, what));
+        }
+        let first = self.pending.iter().find_map(|frame| frame.depth.as_ref());
+        if let Some(image) = first {
+            check_view(image, size).map_err(|what| SourceError::bad_format(&self.path, what))?;
+        }
+        let said = SaidOfDepth {
+            pinhole: self.reader.depth_camera(size),
+            unit_m: self.reader.depth_unit_m(),
+        };
+        self.depth = Some(said.format(&self.path, settings)?);
+        Ok(())
+    }
+
     /// The next frame whose time is later than the last one's.
     fn read_frame(&mut self) -> Option<RawFrame> {
         loop {
@@ -80,6 +129,7 @@ impl Recording {
                 sensor_time_ns,
                 encoding,
                 bytes,
+                depth,
             } = self.reader.next_picture()?;
             if self.last_ns.is_some_and(|last| sensor_time_ns <= last) {
                 self.out_of_order += 1;
@@ -98,6 +148,7 @@ impl Recording {
                 size,
                 format,
                 bytes,
+                depth,
             });
         }
     }
@@ -135,6 +186,9 @@ impl Source for Recording {
         }
         let frame = self.pending.pop_front().or_else(|| self.read_frame());
         self.ended = frame.is_none();
+        if let (Some(frame), true) = (&frame, self.depth.is_some()) {
+            self.tally.frame(frame.sensor_time_s, frame.depth.is_some());
+        }
         Ok(frame)
     }
 
@@ -163,6 +217,7 @@ impl Source for Recording {
                 .filter(|hz: &f64| *hz > 0.0),
             frames_total: self.reader.pictures_total(),
             live: false,
+            depth: self.depth,
         }
     }
 
@@ -190,6 +245,7 @@ impl Source for Recording {
             })
             .collect();
         lines.extend(self.reader.warnings());
+        lines.extend(self.tally.take_warnings(&name.to_string()));
         lines
     }
 }

@@ -156,6 +156,7 @@ impl Source for NokhwaCamera {
                     size,
                     format,
                     bytes,
+                    depth: None,
                 }))
             }
             Ok(None) => Err(SourceError::Timeout {

@@ -169,6 +169,7 @@ impl Video {
                 size: self.size,
                 format: self.format,
                 bytes,
+                depth: None,
             });
         }
         None
@@ -278,6 +279,7 @@ impl Source for Video {
             nominal_rate_hz: self.probe.rate_hz,
             frames_total: self.probe.frames,
             live: false,
+            depth: None,
         }
     }
 

@@ -310,5 +310,6 @@ fn observation(p: &Point, camera: &CameraMotion) -> Observation {
         fb_error_px: p.fb_error_px,
         error_px: p.record.error_px(),
         confirmed: p.trial.is_none(),
+        depth: None,
     }
 }

@@ -1,7 +1,7 @@
 //! The shipped recording, read once for all tests of a file.
 #![allow(dead_code)] // not every test file needs all of it
 
-use arborcam::config;
+use arborcam::config::Config;
 use arborcam::model::{Frame, Outline, RawFrame, Size, TimedFrame};
 use arborcam::outline::Given;
 use arborcam::pipeline::DecodeStage;
@@ -22,8 +22,7 @@ pub const SIZE: Size = Size {
 pub fn recording() -> &'static [RawFrame] {
     static FRAMES: OnceLock<Vec<RawFrame>> = OnceLock::new();
     FRAMES.get_or_init(|| {
-        let mut clip =
-            source::open(Path::new(CLIP), &config::Camera::default(), None).expect("clip");
+        let mut clip = source::open(Path::new(CLIP), &Config::default(), None).expect("clip");
         std::iter::from_fn(|| clip.next_frame().expect("frame")).collect()
     })
 }

@@ -133,7 +133,7 @@ impl Flat {
 /// The tree that the whole of a clip gives, refined as it is by default.
 pub fn grown(clip: &Path, outline: &Path) -> Arc<Model> {
     let config = Config::default();
-    let mut clip = source::open(clip, &config.camera, None).expect("clip");
+    let mut clip = source::open(clip, &config, None).expect("clip");
     let Given::Region(outline) = outline::load(outline, clip.describe().size).expect("outline")
     else {
         panic!("a polygon");

@@ -1,6 +1,6 @@
 //! The virtual machine: made once, booted once a group, its results read from a folder.
 
-use arborcam::config::Camera;
+use arborcam::config::Config;
 use arborcam::model::RawFrame;
 use arborcam::recording::{Head, Limits, Series};
 use arborcam::source;
@@ -238,7 +238,7 @@ pub fn clip(folder: &Path) -> Result<(), String> {
 
 /// The frames of a recording or a video file.
 pub fn frames_of(path: &Path) -> Result<Vec<RawFrame>, String> {
-    let mut source = source::open(path, &Camera::default(), None).map_err(|e| e.to_string())?;
+    let mut source = source::open(path, &Config::default(), None).map_err(|e| e.to_string())?;
     let mut frames = Vec::new();
     while let Some(frame) = source.next_frame().map_err(|e| e.to_string())? {
         frames.push(frame);

@@ -1,7 +1,7 @@
 //! The picture that `arborcam photo` works on: a file, or one frame of a film or a camera.
 
 use crate::cli::command_error::CommandError;
-use crate::config;
+use crate::config::{self, Config};
 use crate::files::{is_named_film, read_bounded};
 use crate::model::{Picture, Size};
 use crate::runtime::{self, FrameError, one_frame};
@@ -100,7 +100,11 @@ impl PictureArgs {
 
     fn read_frame(&self, camera: &config::Camera) -> Result<ShownPicture, CommandError> {
         let shown = self.picture.display();
-        let source = runtime::open(&self.picture, camera, None).map_err(CommandError::no_input)?;
+        let config = Config {
+            camera: camera.clone(),
+            ..Config::default()
+        };
+        let source = runtime::open(&self.picture, &config, None).map_err(CommandError::no_input)?;
         let usual = match source.describe().live {
             true => SETTLED_FRAME,
             false => 0,

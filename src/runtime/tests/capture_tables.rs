@@ -39,6 +39,7 @@ fn tracks(frame: u64) -> TrackSet {
                 fb_error_px: 0.05,
                 error_px: None,
                 confirmed: frame > 20 && id != REJECTED,
+                depth: None,
             });
         }
     }

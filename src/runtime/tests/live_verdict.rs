@@ -71,6 +71,7 @@ impl Film {
             fb_error_px: 0.05,
             error_px: None,
             confirmed: true,
+            depth: None,
         });
         let mut tracks = TrackSet {
             frame: self.next,

@@ -216,6 +216,7 @@ impl Camera {
             size,
             format,
             bytes,
+            depth: None,
         })
     }
 }

@@ -1,0 +1,69 @@
+//! Depth beside the colours.
+
+use super::command_error::CommandError;
+use super::common::parse_within;
+use crate::config;
+use crate::model::Size;
+use crate::source::CameraFile;
+use anyhow::anyhow;
+use clap::Args;
+use std::path::Path;
+
+/// Smallest and largest plausible count of a depth image, m.
+const LEAST_UNIT_M: f64 = 1e-6;
+const LARGEST_UNIT_M: f64 = 1.0;
+
+/// Depth options of every command that films or reads a film.
+#[derive(Clone, Debug, Default, Args)]
+pub struct DepthArgs {
+    /// Metres for each count of a depth image, e.g. 0.001, where the film does not say it, or says it
+    /// wrongly.
+    #[arg(long, value_name = "METRES", value_parser = unit)]
+    depth_unit: Option<f64>,
+    /// The colour camera of a film with depth, where the film does not say it: a JSON file with fx, fy,
+    /// cx and cy (px), or with an intrinsic_matrix as Open3D writes it. See docs/depth.md.
+    #[arg(long, value_name = "FILE", value_parser = camera)]
+    depth_camera: Option<CameraFile>,
+    /// Take the colours of a film with depth alone.
+    #[arg(long, conflicts_with_all = ["depth_unit", "depth_camera"])]
+    no_depth: bool,
+}
+
+/// Parses the unit of depth images, m.
+fn unit(text: &str) -> Result<f64, String> {
+    parse_within(
+        text.trim().trim_end_matches('m'),
+        LEAST_UNIT_M..=LARGEST_UNIT_M,
+        "give the metres of one count, like 0.001",
+    )
+}
+
+fn camera(text: &str) -> Result<CameraFile, String> {
+    CameraFile::read(Path::new(text)).map_err(|e| e.to_string())
+}
+
+impl DepthArgs {
+    /// Applies the options of the command line.
+    pub fn set(&self, depth: &mut config::Depth) {
+        depth.read &= !self.no_depth;
+        depth.unit_m = self.depth_unit.unwrap_or(depth.unit_m);
+        if let Some(CameraFile { pinhole, .. }) = &self.depth_camera {
+            (depth.fx_px, depth.fy_px) = (pinhole.focal_px.x, pinhole.focal_px.y);
+            (depth.cx_px, depth.cy_px) = (pinhole.middle_px.x, pinhole.middle_px.y);
+        }
+    }
+
+    /// Checks that the camera is for pictures of this size.
+    ///
+    /// # Errors
+    /// It is for others.
+    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
+        match self.depth_camera.as_ref().and_then(|camera| camera.size) {
+            Some(of_file) if of_file != size => Err(CommandError::BadUsage(anyhow!(
+                "--depth-camera is for pictures of {of_file}, this film has {size}; give the camera \
+                 of its colour pictures"
+            ))),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Depth beside a picture: images of it, what a point has of it, and what it says of a tree.
+
+use super::{Size, TrackId};
+use nalgebra::{Point2, Point3, Vector2};
+use std::collections::BTreeMap;
+
+/// A camera without distortion: where places before it are seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// Focal lengths across and down, px.
+    pub focal_px: Vector2<f64>,
+    /// Where the axis meets the picture, px.
+    pub middle_px: Point2<f64>,
+}
+
+impl Pinhole {
+    /// The place that is seen at `at_px` in this depth (along the axis), in the camera's axes: x right,
+    /// y down, z away from it, m.
+    pub fn place_m(&self, at_px: Point2<f64>, depth_m: f64) -> Point3<f64> {
+        let ray = (at_px - self.middle_px).component_div(&self.focal_px);
+        Point3::new(ray.x * depth_m, ray.y * depth_m, depth_m)
+    }
+
+    /// Whether it is one: focal lengths above 0, all numbers finite.
+    pub fn is_valid(&self) -> bool {
+        let numbers = self.focal_px.iter().chain(self.middle_px.iter());
+        numbers.clone().all(|x| x.is_finite()) && self.focal_px.iter().all(|f| *f > 0.0)
+    }
+}
+
+/// A depth image as the sensor gives it, row by row: counts of its unit along the axis of the colour
+/// camera, with whose picture it is registered; 0 where nothing was measured.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DepthImage {
+    pub size: Size,
+    pub counts: Vec<u16>,
+}
+
+impl DepthImage {
+    /// Memory that it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        2 * self.counts.len()
+    }
+
+    /// The count of a pixel; `None` where nothing was measured, and outside. The highest number
+    /// marks too far in several formats.
+    pub fn count(&self, u: i64, v: i64) -> Option<u16> {
+        let (u, v) = (u32::try_from(u).ok()?, u32::try_from(v).ok()?);
+        if u >= self.size.width || v >= self.size.height {
+            return None;
+        }
+        let at = v as usize * self.size.width as usize + u as usize;
+        let count = self.counts.get(at).copied();
+        count.filter(|count| *count != 0 && *count != u16::MAX)
+    }
+}
+
+/// What is known of the depth images of a film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthFormat {
+    /// The colour camera, with which they are registered.
+    pub pinhole: Pinhole,
+    /// Metres for each count.
+    pub unit_m: f64,
+}
+
+/// The depth of a point along the camera's axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DepthSeen {
+    pub depth_m: f32,
+    /// Its standard deviation, m.
+    pub sd_m: f32,
+}
+
+/// A place along the line of sight in model axes, towards the viewer from the trunk's foot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NodeDepth {
+    pub z_px: f64,
+    /// Its standard deviation, px.
+    pub sd_px: f64,
+}
+
+/// What depth says of a tree at rest.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RestDepths {
+    /// Distance of the trunk's foot from the camera along its axis, m.
+    pub foot_m: f64,
+    /// Length of a pixel at that distance, m: the scale of the model.
+    pub metres_per_px: f64,
+    /// Depth of the points at rest.
+    pub tracks: BTreeMap<TrackId, DepthSeen>,
+}
+
+impl RestDepths {
+    /// The same place in model axes.
+    pub fn in_model(&self, seen: DepthSeen) -> NodeDepth {
+        NodeDepth {
+            z_px: (self.foot_m - f64::from(seen.depth_m)) / self.metres_per_px,
+            sd_px: f64::from(seen.sd_m) / self.metres_per_px,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_place_is_found_from_its_pixel_and_depth() {
+        let pinhole = Pinhole {
+            focal_px: Vector2::new(500.0, 250.0),
+            middle_px: Point2::new(319.5, 239.5),
+        };
+        let place = pinhole.place_m(Point2::new(419.5, 189.5), 2.0);
+        assert!((place - Point3::new(0.4, -0.4, 2.0)).norm() < 1e-12);
+        assert!(pinhole.is_valid());
+        let none = Pinhole {
+            focal_px: Vector2::new(0.0, 250.0),
+            ..pinhole
+        };
+        assert!(!none.is_valid());
+    }
+
+    #[test]
+    fn what_was_not_measured_is_missing_and_not_near() {
+        let image = DepthImage {
+            size: Size::new(2, 2),
+            counts: vec![0, 900, u16::MAX, 7],
+        };
+        let at = |u, v| image.count(u, v);
+        assert_eq!(
+            [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],
+            [None, Some(900), None, Some(7)]
+        );
+        assert_eq!([at(-1, 0), at(2, 0), at(0, 2)], [None; 3]);
+    }
+}

@@ -1,0 +1,149 @@
+//! Pictures and depth images that come in turns, each with its own time: which belong together.
+
+use super::image::Picture;
+use crate::model::DepthImage;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Images that are further apart in time do not belong together, ns.
+const APART_NS: i64 = 20_000_000;
+/// A picture waits for its depth until something is so much later, ns.
+const PATIENCE_NS: i64 = 100_000_000;
+/// So many pictures and so many depth images are held at most.
+const HELD: usize = 8;
+
+/// Holds pictures back until it is known which depth image belongs to each.
+#[derive(Debug, Default)]
+pub struct Pairing {
+    pictures: VecDeque<Picture>,
+    depths: VecDeque<Timed>,
+    newest_ns: Option<i64>,
+}
+
+#[derive(Debug)]
+struct Timed {
+    time_ns: i64,
+    image: Arc<DepthImage>,
+}
+
+impl Pairing {
+    /// Takes a picture.
+    pub fn picture(&mut self, picture: Picture) {
+        self.seen(picture.sensor_time_ns);
+        self.pictures.push_back(picture);
+    }
+
+    /// Takes a depth image.
+    pub fn depth(&mut self, time_ns: i64, image: Arc<DepthImage>) {
+        self.seen(time_ns);
+        if self.depths.len() == HELD {
+            self.depths.pop_front();
+        }
+        self.depths.push_back(Timed { time_ns, image });
+    }
+
+    fn seen(&mut self, time_ns: i64) {
+        self.newest_ns = Some(self.newest_ns.map_or(time_ns, |newest| newest.max(time_ns)));
+    }
+
+    /// The oldest picture with its depth image, if that is decided.
+    pub fn ready(&mut self) -> Option<Picture> {
+        let time_ns = self.pictures.front()?.sensor_time_ns;
+        let is_passed = self.depths.iter().any(|depth| depth.time_ns >= time_ns);
+        let waited = self
+            .newest_ns
+            .map_or(0, |newest| newest.saturating_sub(time_ns));
+        if is_passed || waited > PATIENCE_NS || self.pictures.len() > HELD {
+            self.oldest()
+        } else {
+            None
+        }
+    }
+
+    /// The oldest picture with its depth image; there is nothing more to wait for.
+    pub fn oldest(&mut self) -> Option<Picture> {
+        let mut picture = self.pictures.pop_front()?;
+        let time_ns = picture.sensor_time_ns;
+        let apart = |depth: &Timed| depth.time_ns.abs_diff(time_ns);
+        let nearest = (0..self.depths.len()).min_by_key(|k| apart(&self.depths[*k]));
+        let nearest = nearest.filter(|k| apart(&self.depths[*k]) <= APART_NS.unsigned_abs());
+        // The next picture may be nearer to it.
+        let next = self.pictures.front().map(|next| next.sensor_time_ns);
+        let nearest = nearest.filter(|k| {
+            let depth = &self.depths[*k];
+            next.is_none_or(|next| apart(depth) <= depth.time_ns.abs_diff(next))
+        });
+        if let Some(k) = nearest {
+            picture.depth = Some(self.depths[k].image.clone());
+            // It and those before it belong to no later picture.
+            self.depths.drain(..=k);
+        }
+        Some(picture)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{PixelFormat, Size};
+    use crate::recording::Encoding;
+
+    const MS: i64 = 1_000_000;
+
+    fn picture(time_ms: i64) -> Picture {
+        Picture {
+            sequence: None,
+            sensor_time_ns: time_ms * MS,
+            encoding: Encoding::Pixels(PixelFormat::Grey, Size::new(1, 1)),
+            bytes: vec![0],
+            depth: None,
+        }
+    }
+
+    fn depth(count: u16) -> Arc<DepthImage> {
+        Arc::new(DepthImage {
+            size: Size::new(1, 1),
+            counts: vec![count],
+        })
+    }
+
+    fn of(picture: Option<Picture>) -> Option<u16> {
+        picture
+            .expect("a picture")
+            .depth
+            .map(|depth| depth.counts[0])
+    }
+
+    #[test]
+    fn depth_may_come_before_or_after_its_picture() {
+        let mut pairing = Pairing::default();
+        pairing.depth(3 * MS, depth(1));
+        pairing.picture(picture(0));
+        assert_eq!(of(pairing.ready()), Some(1));
+        pairing.picture(picture(33));
+        assert!(pairing.ready().is_none());
+        pairing.picture(picture(66));
+        pairing.depth(35 * MS, depth(2));
+        assert_eq!(of(pairing.ready()), Some(2));
+        assert!(pairing.ready().is_none());
+        pairing.depth(120 * MS, depth(3));
+        assert_eq!(of(pairing.ready()), None);
+        pairing.picture(picture(115));
+        assert_eq!(of(pairing.oldest()), Some(3));
+        assert!(pairing.oldest().is_none());
+    }
+
+    #[test]
+    fn pictures_do_not_wait_for_a_stream_that_has_stopped() {
+        let mut pairing = Pairing::default();
+        let mut given = 0;
+        for k in 0..100 {
+            pairing.picture(picture(33 * k));
+            while let Some(picture) = pairing.ready() {
+                assert_eq!(picture.sensor_time_ns, 33 * given * MS);
+                given += 1;
+            }
+        }
+        assert!(given > 90, "{given}");
+    }
+}
