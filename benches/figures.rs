@@ -201,7 +201,13 @@ fn dressed() -> String {
     let mut config = Config::default();
     config.wood.triangles = 20_000;
     let all = || {
-        let skeleton = lift_to_3d(&tree.hierarchy, tree.foot.position_px, &outline, &config);
+        let skeleton = lift_to_3d(
+            &tree.hierarchy,
+            tree.foot.position_px,
+            &outline,
+            &[],
+            &config,
+        );
         dress(
             &skeleton,
             Seen {

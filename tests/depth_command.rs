@@ -196,8 +196,8 @@ fn depth_puts_the_tree_into_space_in_metres_and_a_recording_keeps_it() {
     }
     off_m.sort_by(f64::total_cmp);
     assert!(off_m.len() > 3, "{nodes:?}");
-    // Branches along wood lose some of their depth.
-    assert!(off_m[off_m.len() / 4] < 0.03, "{off_m:?}");
+    // Half a pixel is 3 mm here.
+    assert!(off_m[off_m.len() / 2] < 0.02, "{off_m:?}");
     // The frames with their depth once more, out of the recording.
     is_done(&film.replay("film.mcap", "again", &[]));
     for name in ["nodes.csv", "motion.csv", "tracks.csv", "tree.glb"] {

@@ -185,7 +185,6 @@ fn tips(model: &Model) -> Vec<NodeId> {
 }
 
 #[test]
-#[ignore = "branches along wood lose depth: their way is taken for shorter than it is in space"]
 fn branches_are_where_they_are_seen_and_the_scale_is_known() {
     let model = model(true, &config());
     let depths = model.depths.as_ref().expect("depth");
@@ -202,7 +201,6 @@ fn branches_are_where_they_are_seen_and_the_scale_is_known() {
 }
 
 #[test]
-#[ignore = "the same"]
 fn the_pose_follows_what_comes_nearer_and_goes_away() {
     let config = config();
     let model = Arc::new(model(true, &config));

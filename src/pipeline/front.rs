@@ -202,7 +202,7 @@ impl FrontEnd {
 
 /// Gives the points of a frame their depth.
 fn look_up_depths(reader: &DepthReader, image: &DepthImage, picture: Size, tracks: &mut TrackSet) {
-    let camera = tracks.camera.clone();
+    let camera = tracks.camera;
     for o in &mut tracks.observations {
         o.depth = reader.at(image, picture, camera.filmed_px(o.at_px()));
     }

@@ -40,6 +40,25 @@ pub fn set_depths_apart(tree: &mut Skeleton, trunk: &[bool]) {
     }
 }
 
+/// Gives every measured branch whose end a depth camera has seen that depth, evenly along its way from
+/// where it begins; `seen_z_px` says where the end in a node is, px.
+pub fn set_depths_seen(tree: &mut Skeleton, seen_z_px: impl Fn(NodeId) -> Option<f64>) {
+    for branch in tree.moving_branches() {
+        let is_copy = tree.nodes[branch.node.index()].copy_of.is_some();
+        let Some(end_z) = seen_z_px(branch.node).filter(|_| !is_copy) else {
+            continue;
+        };
+        let lengths_px = lengths_px(tree, &branch);
+        let own = lengths_px.iter().find(|part| part.node == branch.node);
+        let length_px = own.map_or(0.0, |part| part.length_px);
+        let from_z = tree.nodes[branch.begin.index()].position.z;
+        let slope = (end_z - from_z) / length_px.max(f64::MIN_POSITIVE);
+        for part in lengths_px.iter().filter(|_| length_px > 0.0) {
+            tree.nodes[part.node.index()].position.z = from_z + slope * part.length_px;
+        }
+    }
+}
+
 /// A part of a branch, and how far along the branch it is in the picture.
 struct Part {
     node: NodeId,

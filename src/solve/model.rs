@@ -13,7 +13,7 @@ use crate::model::{
     Skeleton, Swaying, TrackId, TrackTable, TreeMode, Wood,
 };
 use crate::motion::Binding;
-use crate::shape::PushFigures;
+use crate::shape::{self, PushFigures};
 use crate::skeleton;
 use nalgebra::Point2;
 use std::collections::{BTreeMap, BTreeSet};
@@ -221,6 +221,7 @@ impl Model {
         };
         let mut joined = along_wood(&straight, branches, &points, &mut names);
         self.names = names.next;
+        self.set_depths_seen(&mut joined.skeleton);
         assign_radii(&mut joined.skeleton, &self.outline_at_rest, config);
         // Radii that are seen go before those of the pipe model, and a width that the user gives
         // before both.
@@ -228,6 +229,17 @@ impl Model {
             taper(&mut joined.skeleton.nodes, &joined.seen_px);
         }
         joined.skeleton
+    }
+
+    /// Branches along wood end where a depth camera has seen the ends of the straight ones.
+    fn set_depths_seen(&self, joined: &mut Skeleton) {
+        let ends = joined.foot_and_branches();
+        shape::set_depths_seen(joined, |node| {
+            let place = ends.iter().position(|end| *end == node)?;
+            let seen = self.seen.get(place).copied().flatten();
+            seen.and(self.plain.nodes.get(place))
+                .map(|straight| straight.position.z)
+        });
     }
 
     /// The skeleton in the picture that it was pushed into space from, with the number of points on
