@@ -141,11 +141,11 @@ settings! {
         /// Focal length of the colour camera across, px; `--depth-camera` sets it and the next three.
         /// Give them where the film does not say them.
         fx_px: f64 [0 ("as the film says") or more] = 0.0;
-        /// The same down, px.
+        /// Focal length of the colour camera down, px.
         fy_px: f64 [0 ("as the film says") or more] = 0.0;
         /// Where the camera's axis meets the picture, px from the left.
         cx_px: f64 [0 or more] = 0.0;
-        /// The same, px from the top.
+        /// Where the camera's axis meets the picture, px from the top.
         cy_px: f64 [0 or more] = 0.0;
     }
 

@@ -16,8 +16,10 @@ pub(super) const POINTS: usize = 16;
 /// Rounds in which points that disagree lose weight: some tracks are always wrong.
 const ROUNDS: usize = 3;
 /// Where there is little to tell the slopes by they are taken for small: as if points of this
-/// weight stood at one standard deviation to all sides and moved alike.
+/// weight stood at one standard deviation to all sides and moved alike. Motions have small slopes;
+/// those of a depth over the picture are not small, and this is just enough for points on a line.
 const SLOPES: f64 = 2.0;
+const SLOPES_OF_DEPTH: f64 = 0.02;
 /// A point that misses by this many times the median has half its weight (Cauchy).
 const HALF_AT: f64 = 2.0;
 /// Misses of tracking itself, px: below it nobody disagrees.
@@ -30,7 +32,17 @@ const FLOOR_PX: f64 = 0.05;
 /// A branch that turns moves its points the farther the farther out they are. Their mean is the
 /// motion of their middle, and the node, a fork or a tip, stands at their edge; the slopes take it
 /// there.
-pub fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>> {
+pub(super) fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>> {
+    at_place(points, least_px, SLOPES)
+}
+
+/// How far the place is towards the viewer, px, by the points around it, whose depths are the first
+/// parts of their displacements; else as [`displacement`].
+pub fn depth(points: &mut [Nearby], least_px: f64) -> Option<f64> {
+    Some(at_place(points, least_px, SLOPES_OF_DEPTH)?.x)
+}
+
+fn at_place(points: &mut [Nearby], least_px: f64, slopes: f64) -> Option<Vector2<f64>> {
     let used = points.len().min(2 * POINTS);
     if used == 0 {
         return None;
@@ -51,7 +63,7 @@ pub fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>
         *weight = (-0.5 * p.offset.norm_squared() / variance).exp();
     }
     let (mut weights, mut misses) = (near, [0.0; 2 * POINTS]);
-    let mut field = fitted(points, &weights, variance);
+    let mut field = fitted(points, &weights, slopes * variance);
     for _ in 1..ROUNDS {
         for (miss, p) in misses.iter_mut().zip(points.iter()) {
             let off = Vector2::from_fn(|c, _| {
@@ -65,7 +77,7 @@ pub fn displacement(points: &mut [Nearby], least_px: f64) -> Option<Vector2<f64>
         for ((weight, near), miss) in weights.iter_mut().zip(&near).zip(&misses) {
             *weight = near / (1.0 + (miss / scale).powi(2));
         }
-        field = fitted(points, &weights, variance);
+        field = fitted(points, &weights, slopes * variance);
     }
     Some(Vector2::new(field[0][0], field[1][0]))
 }
@@ -75,10 +87,11 @@ fn nearer(a: &Nearby, b: &Nearby) -> Ordering {
     a.offset.norm_squared().total_cmp(&b.offset.norm_squared())
 }
 
-/// For either coordinate: displacement at the place, and its slopes along u and v.
-fn fitted(points: &[Nearby], weights: &[f64], variance: f64) -> [[f64; 3]; 2] {
+/// For either coordinate: displacement at the place, and its slopes along u and v, which are small by
+/// `ridge_px2`.
+fn fitted(points: &[Nearby], weights: &[f64], ridge_px2: f64) -> [[f64; 3]; 2] {
     let (mut s, mut su, mut sv, mut suu, mut suv, mut svv) =
-        (0.0, 0.0, 0.0, SLOPES * variance, 0.0, SLOPES * variance);
+        (0.0, 0.0, 0.0, ridge_px2, 0.0, ridge_px2);
     let mut right = [[0.0; 3]; 2];
     for (p, w) in points.iter().zip(weights) {
         let (u, v) = (p.offset.x, p.offset.y);
@@ -134,6 +147,12 @@ mod tests {
             (6.8..=10.0).contains(&moved.x) && moved.y.abs() < 1e-9,
             "{moved:?} of 10 px"
         );
+    }
+
+    #[test]
+    fn the_depth_of_a_tip_is_that_of_its_line() {
+        let at_tip = depth(&mut branch(25, 150.0, 0.6), 5.0).expect("points");
+        assert!((at_tip - 90.0).abs() < 1.0, "{at_tip} of 90 px");
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub use between::between;
 pub use binding::Binding;
 pub use deterministic::direction as deterministic_direction;
 pub use flutter::flutter;
-pub use local::{Nearby, displacement};
+pub use local::{Nearby, depth};
 pub use probabilistic::Problem;
 pub use spread::Spread;
 

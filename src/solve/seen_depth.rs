@@ -3,7 +3,7 @@
 use crate::config;
 use crate::depth;
 use crate::model::{DepthSeen, LogWindow, MotionHierarchy, NodeDepth, RestDepths, TrackId};
-use crate::motion::{Nearby, displacement};
+use crate::motion::{self, Nearby};
 use crate::signal::median;
 use crate::skeleton::Node2d;
 use nalgebra::{Point2, Vector2};
@@ -108,8 +108,8 @@ fn foot_m(
     if points.len() < LEAST_OF_TRUNK {
         return Some(middle_m);
     }
-    let at_foot = displacement(&mut points, LEAST * focal_px)?;
-    Some(middle_m - at_foot.x * about.metres_per_px)
+    let at_foot_px = motion::depth(&mut points, LEAST * focal_px)?;
+    Some(middle_m - at_foot_px * about.metres_per_px)
 }
 
 /// The points that are on no branch above the trunk.
@@ -177,7 +177,7 @@ fn node_depth(
     let sd_m: f64 = median(sds_m.collect(), f32::total_cmp)?.into();
     let focal_px = depths.foot_m / depths.metres_per_px;
     Some(NodeDepth {
-        z_px: displacement(&mut points, LEAST * focal_px)?.x,
+        z_px: motion::depth(&mut points, LEAST * focal_px)?,
         sd_px: sd_m / depths.metres_per_px,
     })
 }
