@@ -317,8 +317,14 @@ fn a_forest_is_drawn_and_has_a_page() {
     assert!(of(|p| p.0[1] < 90) > pixels / 100);
     let refused = arborcam(&[export, forest(), to, &glb], &["--format", "glb"]);
     assert_eq!(refused.status.code(), Some(BAD_USAGE));
-    let film = arborcam(&[render, forest(), to, &dir.path().join("b.mp4")], &[]);
-    assert_eq!(film.status.code(), Some(BAD_USAGE));
+    let film = dir.path().join("b.mp4");
+    let filmed = arborcam(&[render, forest(), to, &film], &["--size", "320x200"]);
+    assert!(
+        filmed.status.success(),
+        "{}",
+        String::from_utf8_lossy(&filmed.stderr)
+    );
+    assert!(film.metadata().expect("a film").len() > 1000);
     let made = arborcam(&[export, forest(), to, &page], &["--format", "html"]);
     let told = String::from_utf8_lossy(&made.stderr);
     // A program that was built without npm has no page.

@@ -285,8 +285,8 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
     }
     for index in &tree.seen.doubtful {
         warnings.push(format!(
-            "along stroke {} nothing is seen that differs from what is at both its sides: it is a branch \
-             by its drawing alone",
+            "along stroke {} hardly anything is seen that differs from what is at both its sides: it is a \
+             branch by its drawing alone; look whether it is on its wood",
             index + 1
         ));
     }
