@@ -25,8 +25,9 @@
 //!
 //! [`model`] shared data types · `source` where frames come from · `outline` which pixels are tree
 //! · `track` points followed · `markers` coloured markers followed · [`tag`] a printed tag that
-//! gives the scale · [`hierarchy`] which points move together · `wood` which pixels are wood · [`skeleton`] in the picture · [`shape`] in space · [`geometry`] its wood and leaves as
-//! meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
+//! gives the scale · [`depth`] what a depth camera has seen of a point · [`hierarchy`] which points
+//! move together · `wood` which pixels are wood · [`skeleton`] in the picture · [`shape`] in space
+//! · [`geometry`] its wood and leaves as meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
 //! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches,
 //! modelled trees and point clouds · [`cloud`] trees in point clouds ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other

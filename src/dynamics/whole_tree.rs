@@ -63,10 +63,13 @@ pub(super) fn withdraw_small(
     let motion_px2: Vec<Vec<f64>> = swings.iter().map(|s| s.motion_px2(film)).collect();
     let mut withdrawn = Vec::new();
     for (own, swing) in swings.iter().enumerate() {
-        let is_asked = |b: &usize| *b != trunk.index() && swing.angle() > 0.0;
-        let Some(branch) = swing.branch.filter(is_asked) else {
+        let Some(branch) = swing.branch.filter(|b| *b != trunk.index()) else {
             continue;
         };
+        // An angle that is not known says nothing.
+        if swing.angle() == 0.0 {
+            continue;
+        }
         let (mut others_px2, mut angle) = (0.0, 0.0);
         for (other, motion_px2) in motion_px2.iter().enumerate() {
             let here_px2: f64 = swing.tracks.iter().map(|&k| motion_px2[k]).sum();

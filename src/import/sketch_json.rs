@@ -37,7 +37,8 @@ struct StrokeEntry {
 /// It is of another form, or its picture of no usable size.
 pub(super) fn parse(text: &str) -> Result<Sketch, ImportError> {
     let file: SketchFile = serde_json::from_str(text).map_err(|e| {
-        let what = r#"a line is {"width": W, "height": H, "polyline_px": [[u, v], ...]}, a crown has polygon_px instead, a drawing strokes"#;
+        let what = "a line is {\"width\": W, \"height\": H, \"polyline_px\": [[u, v], ...]}, a crown has \
+                    polygon_px instead, a drawing strokes";
         ImportError::bad_format(format!("its JSON holds no stroke ({e}); {what}"))
     })?;
     let mut strokes = Vec::with_capacity(file.strokes.len());

@@ -4,6 +4,10 @@ use super::{Size, TrackId};
 use nalgebra::{Point2, Point3, Vector2};
 use std::collections::BTreeMap;
 
+/// A picture and a depth image that are further apart in time do not belong together, s (Sturm et al.
+/// 2012).
+pub const DEPTH_APART_S: f64 = 0.02;
+
 /// A camera without distortion: where places before it are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {

@@ -47,7 +47,9 @@ pub use branch_graph::{BranchGraph, RADIUS_SHARE, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
-pub use depth::{DepthFormat, DepthImage, DepthSeen, NodeDepth, Pinhole, RestDepths};
+pub use depth::{
+    DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, NodeDepth, Pinhole, RestDepths,
+};
 pub use foot::{Foot, FootBasis, TrunkRow};
 pub use forest::{Forest, ForestTree, Ground};
 pub use frame::{

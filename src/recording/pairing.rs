@@ -1,12 +1,12 @@
 //! Pictures and depth images that come in turns, each with its own time: which belong together.
 
 use super::image::Picture;
-use crate::model::DepthImage;
+use crate::model::{DEPTH_APART_S, DepthImage};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Images that are further apart in time do not belong together, ns.
-const APART_NS: i64 = 20_000_000;
+const APART_NS: u64 = (1e9 * DEPTH_APART_S) as u64;
 /// A picture waits for its depth until something is so much later, ns.
 const PATIENCE_NS: i64 = 100_000_000;
 /// So many pictures and so many depth images are held at most.
@@ -66,7 +66,7 @@ impl Pairing {
         let time_ns = picture.sensor_time_ns;
         let apart = |depth: &Timed| depth.time_ns.abs_diff(time_ns);
         let nearest = (0..self.depths.len()).min_by_key(|k| apart(&self.depths[*k]));
-        let nearest = nearest.filter(|k| apart(&self.depths[*k]) <= APART_NS.unsigned_abs());
+        let nearest = nearest.filter(|k| apart(&self.depths[*k]) <= APART_NS);
         // The next picture may be nearer to it.
         let next = self.pictures.front().map(|next| next.sensor_time_ns);
         let nearest = nearest.filter(|k| {

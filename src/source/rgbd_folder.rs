@@ -9,7 +9,9 @@ use super::error::SourceError;
 use super::images::picture;
 use super::interface::{Source, SourceInfo};
 use crate::config;
-use crate::model::{DepthFormat, DepthImage, FormatNote, RawFrame, Size, nanoseconds, seconds};
+use crate::model::{
+    DEPTH_APART_S, DepthFormat, DepthImage, FormatNote, RawFrame, Size, nanoseconds, seconds,
+};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -17,8 +19,6 @@ const COLOURS: &str = "rgb.txt";
 const DEPTHS: &str = "depth.txt";
 /// The colour camera, which the benchmark's own folders do not have.
 const CAMERA: &str = "camera.json";
-/// Images that are further apart in time do not belong together, s (the benchmark's own value).
-const APART_S: f64 = 0.02;
 /// Metres for each count in folders of the benchmark.
 const UNIT_M: f64 = 1.0 / 5000.0;
 /// A longer list is something else, bytes: a day of film has 150 MB.
@@ -93,7 +93,7 @@ impl RgbdFolder {
                 &self.folder,
                 format!(
                     "the clocks of colour and depth do not meet: the nearest two images are {nearest_s:.3} s \
-                     apart, and {APART_S} s is the most; correct the times in depth.txt, or give \
+                     apart, and {DEPTH_APART_S} s is the most; correct the times in depth.txt, or give \
                      --no-depth"
                 ),
             ));
@@ -285,13 +285,13 @@ fn parse_list(folder: &Path, text: &str) -> Result<Vec<Listed>, String> {
 }
 
 /// For every frame the depth image that is nearest in time, if the frame is the nearest to that as well
-/// and the two are no further apart than [`APART_S`].
+/// and the two are no further apart than [`DEPTH_APART_S`].
 fn paired(frames: &[Listed], depths: &[Listed]) -> Vec<Option<PathBuf>> {
     let mut out = Vec::with_capacity(frames.len());
     for (k, frame) in frames.iter().enumerate() {
         let depth = nearest(depths, frame.time_s);
         let is_pair = nearest(frames, depths[depth].time_s) == k
-            && (depths[depth].time_s - frame.time_s).abs() <= APART_S;
+            && (depths[depth].time_s - frame.time_s).abs() <= DEPTH_APART_S;
         out.push(is_pair.then(|| depths[depth].file.clone()));
     }
     out

@@ -1,17 +1,15 @@
 //! Pictures and videos of a prepared forest.
 
-use super::studio::{PLAIN, VIDEO_S, model, nearest, png, rgb, samples, swing_at};
+use super::studio::{PLAIN, VIDEO_S, model, nearest, png, samples, swing_at, write_video};
 use super::{PrepareError, PreparedForest, Shot};
 use crate::draw::{BoundingCylinder, Camera, Look, Model, Placed, Posed, Rgba, scene};
-use crate::export::Film;
-use crate::files::WriteError;
 use crate::geometry::{GROUND_RGB, Mesh, ground};
 use crate::model::{ForestTree, Size};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Trees that are ahead are so by quarters of the loop.
 const QUARTERS: f64 = 4.0;
@@ -80,22 +78,9 @@ impl<'a> ForestStudio<'a> {
     pub fn video(&self, out: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
         let length_s = self.shot.length_s.unwrap_or(VIDEO_S);
         let frames = ((length_s * self.shot.fps).round() as u64).max(1);
-        let mut film: Option<Film> = None;
-        for k in 0..frames {
-            if stop.load(Ordering::SeqCst) {
-                return Err(WriteError::Stopped.into());
-            }
-            let drawn = self.draw(Some(k as f64 / self.shot.fps), k as f64 / frames as f64)?;
-            let film = match &mut film {
-                Some(film) => film,
-                None => film.insert(Film::begin(out, drawn.size, self.shot.fps)?),
-            };
-            film.frame(&rgb(&drawn))?;
-        }
-        match film {
-            Some(film) => Ok(film.finish()?),
-            None => Ok(()),
-        }
+        write_video(out, self.shot.fps, frames, stop, |k| {
+            self.draw(Some(k as f64 / self.shot.fps), k as f64 / frames as f64)
+        })
     }
 
     /// The forest so long after its motion began, s, or at rest; `share` of a video is over.

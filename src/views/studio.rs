@@ -126,23 +126,10 @@ impl<'a> Studio<'a> {
     pub fn video(&self, out: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
         let clip = self.clip()?;
         let frames = ((clip.length_s * self.shot.fps).round() as u64).max(1);
-        let mut film: Option<Film> = None;
-        for k in 0..frames {
-            if stop.load(Ordering::SeqCst) {
-                return Err(WriteError::Stopped.into());
-            }
+        write_video(out, self.shot.fps, frames, stop, |k| {
             let pose = clip.pose(&self.tree.poses, k as f64 / self.shot.fps);
-            let drawn = self.draw(&self.posed(pose), k as f64 / frames as f64);
-            let film = match &mut film {
-                Some(film) => film,
-                None => film.insert(Film::begin(out, drawn.size, self.shot.fps)?),
-            };
-            film.frame(&rgb(&drawn))?;
-        }
-        match film {
-            Some(film) => Ok(film.finish()?),
-            None => Ok(()),
-        }
+            Ok(self.draw(&self.posed(pose), k as f64 / frames as f64))
+        })
     }
 
     /// Which part of the poses a video shows.
@@ -289,7 +276,36 @@ fn bounds(tree: &PreparedTree, model: &Model) -> BoundingCylinder {
     BoundingCylinder::of(joints.map(|j| j.position)).map_or(rest, |all| all.with(&rest))
 }
 
-pub(super) fn rgb(drawn: &Rgba) -> Vec<u8> {
+/// Writes a video (MP4) of so many pictures to `out`; `draw` gives each by its number.
+///
+/// # Errors
+/// A picture cannot be drawn, the video cannot be written, or `stop` ends it before.
+pub(super) fn write_video(
+    out: &Path,
+    fps: f64,
+    frames: u64,
+    stop: &AtomicBool,
+    draw: impl Fn(u64) -> Result<Rgba, PrepareError>,
+) -> Result<(), PrepareError> {
+    let mut film: Option<Film> = None;
+    for k in 0..frames {
+        if stop.load(Ordering::SeqCst) {
+            return Err(WriteError::Stopped.into());
+        }
+        let drawn = draw(k)?;
+        let film = match &mut film {
+            Some(film) => film,
+            None => film.insert(Film::begin(out, drawn.size, fps)?),
+        };
+        film.frame(&rgb(&drawn))?;
+    }
+    match film {
+        Some(film) => Ok(film.finish()?),
+        None => Ok(()),
+    }
+}
+
+fn rgb(drawn: &Rgba) -> Vec<u8> {
     let pixels = drawn.pixels.chunks_exact(4);
     pixels.flat_map(|p| [p[0], p[1], p[2]]).collect()
 }
