@@ -2,7 +2,7 @@
 
 use crate::model::{DepthSeen, Observation, TrackId};
 use crate::signal::median;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A point's depth is known by so many of its first ones: half a second, in which a few may be wrong.
 const FIRST: usize = 15;
@@ -13,18 +13,16 @@ const LEAST: usize = 5;
 const FARTHEST_SHARE: f64 = 0.25;
 
 /// Leaves out depths that cannot be those of a point: a marker or a point that was lost to what is
-/// behind the tree, or before it, has no depth there.
+/// behind the tree, or before it, has no depth there. A marker that was lost and is found again is held
+/// to what it was: some hundred bytes are kept of each point.
 #[derive(Clone, Debug, Default)]
 pub struct DepthGate {
     first_m: BTreeMap<TrackId, Vec<f64>>,
 }
 
 impl DepthGate {
-    /// Takes the depths away that are not those of their points. Points that are no longer seen are
-    /// forgotten.
+    /// Takes the depths away that are not those of their points.
     pub fn step(&mut self, observations: &mut [Observation]) {
-        let seen: BTreeSet<TrackId> = observations.iter().map(|o| o.id).collect();
-        self.first_m.retain(|id, _| seen.contains(id));
         for o in observations {
             o.depth = o.depth.filter(|depth| self.is_of(o.id, depth));
         }
@@ -75,6 +73,12 @@ mod tests {
                 30..50 => 4.7,
                 _ => 2.0 + 0.3 * (f64::from(k) / 5.0).sin(),
             };
+            // In between it is not seen at all.
+            if k == 29 {
+                gate.step(&mut [seen(8, 3.0)]);
+                kept.push(true);
+                continue;
+            }
             let mut observations = [seen(7, depth_m), seen(8, 3.0)];
             gate.step(&mut observations);
             kept.push(observations[0].depth.is_some());
