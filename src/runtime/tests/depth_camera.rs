@@ -78,7 +78,7 @@ fn depth(k: u64) -> RawFrame {
     }
 }
 
-/// Both cameras, and what they are told.
+/// Both cameras, and their scripts.
 struct Stage {
     pictures: Sender<Result<RawFrame, &'static str>>,
     depths: Sender<Result<RawFrame, &'static str>>,
