@@ -5,6 +5,7 @@
 //! documentation and help texts are derived from that.
 
 mod declare;
+mod depth_camera;
 mod load;
 mod markers;
 mod reference;
@@ -12,6 +13,7 @@ mod reload;
 mod setting;
 mod settings;
 
+pub use depth_camera::DepthCamera;
 pub use load::{ConfigError, STROKE_POINTS, check_strokes};
 pub use markers::{MAX_MARKERS, MarkerCorrection, MarkerWindow};
 pub use reference::{default_file, help, tables};

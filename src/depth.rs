@@ -1,10 +1,16 @@
 //! The depth of a point in a depth image. Holes are missing, and so are flying pixels: at the edge of
 //! a branch a sensor mixes it with what is behind, and gives a depth where nothing is.
 
+mod gate;
+mod register;
+
+pub use gate::DepthGate;
+pub use register::Registration;
+
 use crate::config;
-use crate::model::{DepthFormat, DepthImage, DepthSeen, Pinhole, Size};
+use crate::model::{CameraModel, DepthFormat, DepthImage, DepthRig, DepthSeen, Pinhole, Size};
 use crate::signal::median;
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector2};
 
 /// The depth of a point is that of the pixels around it up to this distance, px of the depth image.
 const RADIUS: i64 = 2;
@@ -26,6 +32,29 @@ pub fn pinhole(settings: &config::Depth) -> Option<Pinhole> {
         middle_px: Point2::new(settings.cx_px, settings.cy_px),
     };
     pinhole.is_valid().then_some(pinhole)
+}
+
+/// The depth camera of the settings beside the colour camera; `None` where they have none.
+pub fn rig(settings: &config::Depth, colour: CameraModel) -> Option<DepthRig> {
+    let own = settings.own_camera.first()?;
+    let pinhole = Pinhole {
+        focal_px: Vector2::new(own.fx_px, own.fy_px),
+        middle_px: Point2::new(own.cx_px, own.cy_px),
+    };
+    let mut depth = CameraModel::new(Size::new(own.width, own.height), pinhole);
+    for (to, from) in depth.distortion.iter_mut().zip(&own.distortion) {
+        *to = *from;
+    }
+    let turn = Rotation3::from_matrix(&Matrix3::from_row_slice(&own.rotation));
+    let colour_from_depth = Isometry3::from_parts(
+        Translation3::from(own.translation_m),
+        UnitQuaternion::from_rotation_matrix(&turn),
+    );
+    Some(DepthRig {
+        depth,
+        colour,
+        colour_from_depth,
+    })
 }
 
 /// The format of the film's depth images by the settings of its run; `None` for a film without depth.

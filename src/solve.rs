@@ -234,7 +234,7 @@ fn build(
     for (row, id) in table.ids.iter().enumerate() {
         rest_px.insert(*id, hierarchy::rest_position_px(table, row));
     }
-    let depths = rest_depths(depths, &hierarchy, &rest_px, foot_px, &config.depth);
+    let depths = rest_depths(depths, &rest_px, foot_px, &config.depth);
     let (flat, _) = lift::flat(&hierarchy, foot_px, config);
     let seen = depths.as_ref().map_or(Vec::new(), |depths| {
         node_depths(&flat, &hierarchy, &rest_px, depths)

@@ -271,6 +271,8 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("turbojpeg::", &["source"]),
     ("mcap::", &["recording"]),
     ("crc32fast::", &["recording"]),
+    ("bzip2::", &["recording"]),
+    ("lz4::", &["recording"]),
     ("hound::", &["animate"]),
     // All draw from the one generator.
     ("rand_chacha::", &["random"]),

@@ -4,7 +4,6 @@
 #[path = "support/chance.rs"]
 mod chance;
 #[path = "support/ros.rs"]
-#[allow(dead_code)] // faults are for other tests
 mod ros;
 
 use arborcam::cloud::{CloudOptions, tree_of_cloud};
@@ -12,6 +11,7 @@ use arborcam::config::Config;
 use arborcam::import::{CloudFormat, FlatModel, joined, read_cloud, read_model, read_sketch};
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
+use arborcam::source::{self, CameraFile, kinect_rig};
 use chance::Chance;
 use std::fs;
 use std::io::Cursor;
@@ -128,6 +128,32 @@ fn no_text_brings_the_parsers_down() {
         each(&seed, |bytes| {
             let text = String::from_utf8_lossy(bytes);
             let _ = arborcam::outline::parse(&text, "seed.json".into(), Size::new(64, 36));
+        });
+    }
+}
+
+#[test]
+fn no_camera_file_and_no_list_brings_the_readers_down() {
+    let mut cameras = 0;
+    for seed in seeds("camera") {
+        each(&seed, |bytes| {
+            let text = String::from_utf8_lossy(bytes);
+            let camera = CameraFile::parse(&text);
+            let rig = kinect_rig(&text, Size::new(640, 576), Size::new(1280, 720));
+            cameras += usize::from(camera.is_ok()) + usize::from(rig.is_ok());
+            assert!(camera.err().is_none_or(|what| !what.contains('\n')));
+            assert!(rig.err().is_none_or(|what| !what.contains('\n')));
+        });
+    }
+    assert!(cameras > 100, "hardly any was ever read: {cameras}");
+    let folder = tempfile::tempdir().expect("folder");
+    for seed in seeds("list") {
+        each(&seed, |bytes| {
+            for name in ["rgb.txt", "depth.txt"] {
+                fs::write(folder.path().join(name), bytes).expect("list");
+            }
+            let said = source::open(folder.path(), &Config::default(), None).err();
+            assert!(said.is_some_and(|e| !e.to_string().contains('\n')));
         });
     }
 }

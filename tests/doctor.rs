@@ -17,6 +17,7 @@ fn sound() -> Facts {
         config_error: None,
         seen: Seen {
             films: vec![(PathBuf::from("/dev/video0"), "Cam".into())],
+            depths: vec![(PathBuf::from("/dev/video2"), "Depth".into())],
             chosen: Some(PathBuf::from("/dev/video0")),
         },
         node: Some(Node::Opens),

@@ -71,7 +71,7 @@ impl Common {
             self.markers.set(config);
             self.depth.set(&mut config.depth);
             if let Some(camera) = camera {
-                camera.set(&mut config.camera);
+                camera.set(config);
             }
         })
     }

@@ -46,11 +46,14 @@ impl DepthArgs {
     /// Applies the options of the command line.
     pub fn set(&self, depth: &mut config::Depth) {
         depth.read &= !self.no_depth;
-        depth.unit_m = self.depth_unit.unwrap_or(depth.unit_m);
-        if let Some(CameraFile { pinhole, .. }) = &self.depth_camera {
+        if let Some(file) = &self.depth_camera {
+            let pinhole = file.pinhole;
             (depth.fx_px, depth.fy_px) = (pinhole.focal_px.x, pinhole.focal_px.y);
             (depth.cx_px, depth.cy_px) = (pinhole.middle_px.x, pinhole.middle_px.y);
+            depth.own_camera = file.depth.iter().cloned().collect();
+            depth.unit_m = file.unit_m.unwrap_or(depth.unit_m);
         }
+        depth.unit_m = self.depth_unit.unwrap_or(depth.unit_m);
     }
 
     /// Checks that the camera is for pictures of this size.

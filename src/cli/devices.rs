@@ -59,6 +59,7 @@ fn json(d: &Device) -> serde_json::Value {
         "link": d.link,
         "films": d.films,
         "modes": d.modes.iter().map(mode_json).collect::<Vec<_>>(),
+        "depth_modes": d.depth_modes.iter().map(mode_json).collect::<Vec<_>>(),
         "chosen": d.chosen.as_ref().map(|(mode, why)| serde_json::json!({ "mode": mode, "why": why })),
         "closed": d.closed,
     })
@@ -85,6 +86,9 @@ fn shown(d: &Device) -> String {
     }
     for row in rows(&d.modes) {
         text += &detail("offers", &row);
+    }
+    for row in rows(&d.depth_modes) {
+        text += &detail("depth", &row);
     }
     if let Some((mode, why)) = &d.chosen {
         text += &detail("would be", &format!("{mode}: {why}"));
@@ -160,6 +164,7 @@ mod tests {
             link: None,
             films: true,
             modes,
+            depth_modes: vec![mode(PixelFormat::Z16, 848, 480, &[30.0])],
             chosen: Some(("MJPG 1280x720 @ 30".into(), "why".into())),
             closed: None,
         };
@@ -168,6 +173,7 @@ mod tests {
             "/dev/video2",
             "usb-046d:0825-A1-0.0 (usb 1-1, serial number A1)",
             "would be  MJPG 1280x720 @ 30: why",
+            "depth     Z16 848x480 @ 30",
         ] {
             assert!(text.contains(what), "{text}");
         }

@@ -1,6 +1,6 @@
 //! `arborcam record DEVICE FILE.mcap`: records frames to a file, without tracking.
 
-use super::camera::CameraArgs;
+use super::camera::{CameraArgs, check_depth};
 use super::command_error::CommandError;
 use super::depth::DepthArgs;
 use super::hangup::SighupAction;
@@ -44,13 +44,14 @@ pub struct RecordArgs {
 
 pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let config = Config::default().layered(args.config.as_deref(), |config| {
-        args.camera.set(&mut config.camera);
+        args.camera.set(config);
         args.depth.set(&mut config.depth);
     })?;
     args.notes.check()?;
     recording::check_new_file(&args.file)?;
     let source = runtime::open(&args.device, &config, None).map_err(CommandError::no_input)?;
     let info = source.describe();
+    check_depth(&args.camera, &info)?;
     let notes = args.notes.over(&*source)?;
     let stop = stop_on_signals(SighupAction::ends_this_process())?;
     init_log(true);

@@ -1,6 +1,6 @@
 //! One run of `capture` or `replay`: opens the source, runs the capture, shows it, reports the end.
 
-use super::camera::CameraArgs;
+use super::camera::{CameraArgs, check_depth};
 use super::command_error::{CommandError, FAILED};
 use super::common::Common;
 use super::hangup::{Reload, SighupAction};
@@ -117,6 +117,9 @@ fn job(
     headless: bool,
 ) -> Result<Job, CommandError> {
     let info = source.describe();
+    if let Some(camera) = plan.camera {
+        check_depth(camera, &info)?;
+    }
     common.shape.check_size(info.size)?;
     common.scale.check_size(info.size)?;
     common.strokes.check_size(info.size)?;

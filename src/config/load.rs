@@ -27,6 +27,8 @@ pub enum ConfigError {
     },
     #[error("markers: {what}")]
     Markers { what: String },
+    #[error("depth camera: {what}")]
+    DepthCamera { what: String },
 }
 
 impl ConfigError {
@@ -138,6 +140,7 @@ impl Config {
                 allowed: "an odd number",
             });
         }
+        super::depth_camera::check(&self.depth.own_camera)?;
         super::markers::check(&self.markers.windows, &self.markers.corrections)?;
         check_strokes(&self.skeleton.strokes_px)
     }

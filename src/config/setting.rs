@@ -125,6 +125,16 @@ impl SettingValue for bool {
     }
 }
 
+impl SettingValue for String {
+    fn number(&self) -> Option<f64> {
+        None
+    }
+
+    fn as_toml(&self) -> String {
+        format!("{self:?}")
+    }
+}
+
 /// Points of a picture, or lines of them, px.
 impl<T: std::fmt::Debug> SettingValue for Vec<T> {
     fn number(&self) -> Option<f64> {

@@ -6,6 +6,7 @@
 //! 640 px" are for a picture 640 pixels wide and grow with the picture.
 
 use super::declare::{choice, first, range, settings};
+use super::depth_camera::DepthCamera;
 use super::markers::{MarkerCorrection, MarkerWindow};
 use super::setting::Effect::{self, NextStart, Now};
 use super::setting::{Choice, Range, Section, Setting, SettingValue};
@@ -147,6 +148,13 @@ settings! {
         cx_px: f64 [0 or more] = 0.0;
         /// Where the camera's axis meets the picture, px from the top.
         cy_px: f64 [0 or more] = 0.0;
+        /// The depth camera, where its images are not registered with the colours, none or one:
+        /// `[{width, height, fx_px, fy_px, cx_px, cy_px, rotation, translation_m}]`; `--depth-camera`
+        /// sets it.
+        own_camera: Vec<DepthCamera> = Vec::new();
+        /// A device with depth beside the camera that films, `/dev/video2` or its permanent name;
+        /// `--depth` sets it. Empty: none.
+        device: String = String::new();
     }
 
     /// When enough motion has been seen to build the tree.

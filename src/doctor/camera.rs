@@ -18,6 +18,8 @@ const SILENCE_S: f64 = 3.0;
 pub struct Seen {
     /// Path and name of everything that films.
     pub films: Vec<(PathBuf, String)>,
+    /// The same of what gives depth.
+    pub depths: Vec<(PathBuf, String)>,
     /// The named one, else the first that films.
     pub chosen: Option<PathBuf>,
 }
@@ -51,15 +53,23 @@ pub enum Film {
 }
 
 pub fn seen(device: Option<&Path>) -> Seen {
-    let films: Vec<(PathBuf, String)> = source::list()
-        .into_iter()
-        .filter(|d| d.films)
-        .map(|d| (d.path, d.name))
-        .collect();
+    let (mut films, mut depths) = (Vec::new(), Vec::new());
+    for device in source::list() {
+        if !device.depth_modes.is_empty() {
+            depths.push((device.path.clone(), device.name.clone()));
+        }
+        if device.films {
+            films.push((device.path, device.name));
+        }
+    }
     let chosen = device
         .map(Path::to_path_buf)
         .or_else(|| films.first().map(|(path, _)| path.clone()));
-    Seen { films, chosen }
+    Seen {
+        films,
+        depths,
+        chosen,
+    }
 }
 
 pub fn node(device: &Path) -> Node {

@@ -54,6 +54,19 @@ fn settings(error: Option<&str>) -> Check {
     }
 }
 
+/// Depth cameras that may be used beside the camera.
+fn depth_words(seen: &Seen) -> String {
+    let beside = seen
+        .depths
+        .iter()
+        .filter(|(path, _)| Some(path) != seen.chosen.as_ref());
+    let paths: Vec<String> = beside.map(|(path, _)| path.display().to_string()).collect();
+    match paths.as_slice() {
+        [] => String::new(),
+        paths => format!("; depth, for --depth: {}", paths.join(", ")),
+    }
+}
+
 fn camera(seen: &Seen) -> Check {
     match &seen.chosen {
         Some(chosen) => {
@@ -66,8 +79,9 @@ fn camera(seen: &Seen) -> Check {
             Check::ok(
                 "camera",
                 format!(
-                    "{} {name} would be taken; {others} more there",
-                    chosen.display()
+                    "{} {name} would be taken; {others} more there{}",
+                    chosen.display(),
+                    depth_words(seen)
                 )
                 .replace("  ", " "),
             )

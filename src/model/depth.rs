@@ -40,14 +40,41 @@ pub struct DepthImage {
     pub counts: Vec<u16>,
 }
 
+/// Length of a count of [`DepthImage::from_metres`], m: below the noise of all sensors from 1 m on.
+pub const METRES_UNIT_M: f64 = 0.001;
+
 impl DepthImage {
+    /// An image of depths in metres, row by row, in counts of [`METRES_UNIT_M`]; what is no depth
+    /// above 0, or is beyond 65 m, is a hole. `None` where there are too few numbers.
+    pub fn from_metres(size: Size, metres: impl Iterator<Item = f32>) -> Option<Self> {
+        let mut counts = Vec::with_capacity(size.area());
+        for depth_m in metres.take(size.area()) {
+            let count = (f64::from(depth_m) / METRES_UNIT_M).round();
+            let is_depth = (1.0..f64::from(u16::MAX)).contains(&count);
+            counts.push(if is_depth { count as u16 } else { 0 });
+        }
+        (counts.len() == size.area()).then_some(Self { size, counts })
+    }
+
+    /// An image of counts of two bytes, the lower first; `None` where there are too few.
+    pub fn from_bytes(size: Size, bytes: &[u8]) -> Option<Self> {
+        let pixels = bytes.chunks_exact(2).take(size.area());
+        let counts: Vec<u16> = pixels.map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        (counts.len() == size.area()).then_some(Self { size, counts })
+    }
+
     /// Memory that it takes, bytes.
     pub fn bytes(&self) -> usize {
         2 * self.counts.len()
     }
 
-    /// The count of a pixel; `None` where nothing was measured, and outside. The highest number
-    /// marks too far in several formats.
+    /// Whether a count says that nothing was measured. The highest number marks too far in several
+    /// formats.
+    pub fn is_hole(count: u16) -> bool {
+        count == 0 || count == u16::MAX
+    }
+
+    /// The count of a pixel; `None` where nothing was measured, and outside.
     pub fn count(&self, u: i64, v: i64) -> Option<u16> {
         let (u, v) = (u32::try_from(u).ok()?, u32::try_from(v).ok()?);
         if u >= self.size.width || v >= self.size.height {
@@ -55,7 +82,7 @@ impl DepthImage {
         }
         let at = v as usize * self.size.width as usize + u as usize;
         let count = self.counts.get(at).copied();
-        count.filter(|count| *count != 0 && *count != u16::MAX)
+        count.filter(|count| !Self::is_hole(*count))
     }
 }
 
@@ -123,6 +150,15 @@ mod tests {
             ..pinhole
         };
         assert!(!none.is_valid());
+    }
+
+    #[test]
+    fn depths_in_metres_are_counted_and_holes_stay_holes() {
+        let metres = [2.0, 0.0, f32::NAN, f32::INFINITY, -1.0, 1.2346];
+        let size = Size::new(3, 2);
+        let image = DepthImage::from_metres(size, metres.into_iter()).expect("an image");
+        assert_eq!(image.counts, [2000, 0, 0, 0, 0, 1235]);
+        assert_eq!(DepthImage::from_metres(size, [1.0].into_iter()), None);
     }
 
     #[test]

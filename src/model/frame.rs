@@ -59,9 +59,14 @@ pub enum PixelFormat {
     Grey,
     /// Three bytes a pixel, red first.
     Rgb24,
+    /// Two bytes a pixel of depth, the lower first.
+    Z16,
+    /// The same of light or, with some depth cameras, of depth.
+    Y16,
 }
 
 impl PixelFormat {
+    /// Formats of pictures.
     pub const ALL: [PixelFormat; 6] = [
         PixelFormat::Mjpeg,
         PixelFormat::Yuyv,
@@ -71,7 +76,10 @@ impl PixelFormat {
         PixelFormat::Rgb24,
     ];
 
-    /// The name that V4L2 gives it, four letters.
+    /// Formats of depth images, the best first.
+    pub const DEPTH: [PixelFormat; 2] = [PixelFormat::Z16, PixelFormat::Y16];
+
+    /// The name that V4L2 gives it, four letters; blanks at the end are left out.
     pub fn fourcc(self) -> &'static str {
         match self {
             PixelFormat::Mjpeg => "MJPG",
@@ -80,6 +88,8 @@ impl PixelFormat {
             PixelFormat::Nv12 => "NV12",
             PixelFormat::Grey => "GREY",
             PixelFormat::Rgb24 => "RGB3",
+            PixelFormat::Z16 => "Z16",
+            PixelFormat::Y16 => "Y16",
         }
     }
 
@@ -88,7 +98,13 @@ impl PixelFormat {
         if name == "JPEG" {
             return Some(PixelFormat::Mjpeg);
         }
-        Self::ALL.into_iter().find(|format| format.fourcc() == name)
+        let mut formats = Self::ALL.into_iter().chain(Self::DEPTH);
+        formats.find(|format| format.fourcc() == name.trim_end())
+    }
+
+    /// Whether its images are of depth.
+    pub fn is_depth(self) -> bool {
+        Self::DEPTH.contains(&self)
     }
 
     /// Bytes of a picture without padding; `None` where that depends on the picture.
@@ -96,7 +112,9 @@ impl PixelFormat {
         let (width, height) = (size.width as usize, size.height as usize);
         match self {
             PixelFormat::Mjpeg => None,
-            PixelFormat::Yuyv | PixelFormat::Uyvy => Some(2 * width * height),
+            PixelFormat::Yuyv | PixelFormat::Uyvy | PixelFormat::Z16 | PixelFormat::Y16 => {
+                Some(2 * width * height)
+            }
             PixelFormat::Nv12 => Some(width * height + 2 * (width / 2) * (height / 2)),
             PixelFormat::Grey => Some(width * height),
             PixelFormat::Rgb24 => Some(3 * width * height),

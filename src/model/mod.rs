@@ -10,6 +10,7 @@ mod camera_motion;
 mod capture_facts;
 mod control;
 mod depth;
+mod depth_rig;
 mod foot;
 mod forest;
 mod frame;
@@ -48,8 +49,10 @@ pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use depth::{
-    DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, NodeDepth, Pinhole, RestDepths,
+    DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, METRES_UNIT_M, NodeDepth, Pinhole,
+    RestDepths,
 };
+pub use depth_rig::{CameraModel, DepthRig};
 pub use foot::{Foot, FootBasis, TrunkRow};
 pub use forest::{Forest, ForestTree, Ground};
 pub use frame::{
@@ -69,12 +72,14 @@ pub use participation::{Participation, moves_with, participation, reason};
 pub use point_cloud::{MOST_CLOUD_POINTS, PointCloud};
 pub use pose::{JointMotion, JointPose, Pose};
 pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
-pub use snapshot::{BranchRow, CameraState, FormatNote, Phase, Snapshot, StillNeeded};
+pub use snapshot::{
+    BranchRow, CameraState, DepthCameraState, FormatNote, Phase, Snapshot, StillNeeded,
+};
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
 pub use sway_columns::SwayColumns;
 pub use sway_now::{AngleSpectrum, Angles, BranchSway, SwayNow};
 pub use tag_scale::TagScale;
-pub use timing::{Gap, GapCause, MAX_GAPS, Timing};
+pub use timing::{DepthCounts, Gap, GapCause, MAX_GAPS, Timing};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};
 pub use track_table::TrackTable;

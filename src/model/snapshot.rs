@@ -2,8 +2,8 @@
 //! changed.
 
 use super::{
-    Angles, Background, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Verdict, Wood,
-    WoodSight,
+    Angles, Background, DepthCounts, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Verdict,
+    Wood, WoodSight,
 };
 use nalgebra::Point2;
 use std::sync::Arc;
@@ -71,6 +71,16 @@ pub struct CameraState {
     pub clock: &'static str,
     /// It has delivered at another rate than it promised for seconds.
     pub rate_off: bool,
+    /// Of the depth camera beside it; `None` where there is none.
+    pub depth: Option<DepthCameraState>,
+}
+
+/// How a depth camera beside the camera does. The counts only ever grow.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DepthCameraState {
+    /// Why it is gone.
+    pub away: Option<String>,
+    pub counts: DepthCounts,
 }
 
 /// One line of the table of branches.

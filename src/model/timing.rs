@@ -41,6 +41,9 @@ pub struct Timing {
     /// The first [`MAX_GAPS`] holes, in the order in which they were found.
     pub gaps: Vec<Gap>,
     pub gaps_not_listed: u64,
+    /// Of the depth camera beside the camera; `None` where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth: Option<DepthCounts>,
     /// From the first frame to the last, s.
     pub duration_s: f64,
 }
@@ -61,6 +64,21 @@ impl Timing {
             self.gaps_not_listed += 1;
         }
     }
+}
+
+/// Images of a depth camera beside the camera.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DepthCounts {
+    /// That came.
+    pub images: u64,
+    /// Lost before us or damaged, by the driver's numbers or by the times.
+    pub images_lost: u64,
+    /// That came and were not taken in time.
+    pub images_dropped: u64,
+    /// Frames of the camera without a depth image of their time.
+    pub frames_without: u64,
+    /// How often it was lost.
+    pub absences: u64,
 }
 
 /// A time from which there are no frames.

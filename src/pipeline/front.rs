@@ -4,7 +4,7 @@ use super::back::Followed;
 use super::marked::MarkerStage;
 use super::tagged::{TagNews, TagStage};
 use crate::config::{Config, MarkerWindow};
-use crate::depth::DepthReader;
+use crate::depth::{DepthGate, DepthReader};
 use crate::markers::{MarkerError, MarkerEvent, MarkerPlace};
 use crate::model::{DepthImage, Frame, Luma, Outline, Size, TrackSet};
 use crate::outline::{AutoOutline, Found};
@@ -32,6 +32,7 @@ pub struct FrontEnd {
     markers: MarkerStage,
     tag: TagStage,
     depth: Option<DepthReader>,
+    depth_gate: DepthGate,
     next_id: u32,
     spare: Option<Luma>,
     progress: f64,
@@ -52,6 +53,7 @@ impl FrontEnd {
             markers: MarkerStage::new(&config.markers),
             tag: TagStage::new(&config.tag),
             depth: DepthReader::new(&config.depth),
+            depth_gate: DepthGate::default(),
             next_id: 0,
             spare: None,
             progress: 0.0,
@@ -188,6 +190,7 @@ impl FrontEnd {
         MarkerStage::join(&markers, &mut tracks);
         if let (Some(reader), Some(image)) = (&self.depth, &frame.depth) {
             look_up_depths(reader, image, frame.luma.size, &mut tracks);
+            self.depth_gate.step(&mut tracks.observations);
         }
         self.spare = Some(frame.luma);
         Some(Followed {

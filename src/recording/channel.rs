@@ -11,6 +11,10 @@ const REGISTERED: [&str; 2] = ["aligned", "registered"];
 /// In the names of topics with pictures in colour.
 const COLOUR: [&str; 2] = ["color", "rgb"];
 
+/// Ends the topic of a stream of a RealSense camera, and is within that of its transform.
+const REALSENSE_IMAGE: &str = "/image/data";
+const STREAM_TRANSFORM: &str = "/tf/";
+
 /// A series of messages.
 pub(super) struct Channel {
     pub topic: String,
@@ -28,6 +32,8 @@ pub(super) enum Role {
     Depth,
     /// Focal lengths and middle of a camera.
     Camera,
+    /// Where frames of reference, or the streams of a camera, stand.
+    Transform,
     Other,
 }
 
@@ -37,8 +43,14 @@ impl Channel {
         let is_foxglove =
             self.layout.is_none() && (self.schema == COMPRESSED_IMAGE || self.schema == RAW_IMAGE);
         let kind = Kind::of(&self.schema).filter(|_| self.layout.is_some());
-        if kind == Some(Kind::CameraInfo) {
-            return Role::Camera;
+        match kind {
+            Some(Kind::CameraInfo) => return Role::Camera,
+            Some(Kind::Transforms) => return Role::Transform,
+            Some(Kind::Transform) if self.topic.contains(STREAM_TRANSFORM) => {
+                return Role::Transform;
+            }
+            Some(Kind::Transform) => return Role::Other,
+            Some(Kind::Image | Kind::CompressedImage) | None => {}
         }
         if !is_foxglove && kind.is_none() {
             return Role::Other;
@@ -72,11 +84,20 @@ fn names_depth(topic: &str) -> bool {
     parts.next().is_some_and(|part| part.contains(DEPTH))
 }
 
-/// The topic of the camera beside an image's: its last part is the camera's.
+/// The topic of the camera beside an image's: its last part is the camera's, and with RealSense cameras
+/// the last two.
 pub(super) fn camera_topic(image: &str) -> Option<String> {
+    if let Some(stream) = image.strip_suffix(REALSENSE_IMAGE) {
+        return Some(format!("{stream}/info/camera_info"));
+    }
     let image = image.strip_suffix("/compressed").unwrap_or(image);
     let (beside, _) = image.rsplit_once('/')?;
     Some(format!("{beside}/camera_info"))
+}
+
+/// Whether an image's topic is one that a RealSense camera's own program records.
+pub(super) fn is_of_realsense(image: &str) -> bool {
+    image.starts_with("/device_") && image.ends_with(REALSENSE_IMAGE)
 }
 
 /// Whether a topic says that its depth is registered with the pictures.
@@ -109,5 +130,9 @@ mod tests {
         let of = |topic| camera_topic(topic).expect("a topic");
         assert_eq!(of("/a/color/image_raw"), "/a/color/camera_info");
         assert_eq!(of("/a/color/image_raw/compressed"), "/a/color/camera_info");
+        assert_eq!(
+            of("/device_0/sensor_0/Depth_0/image/data"),
+            "/device_0/sensor_0/Depth_0/info/camera_info"
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use super::schema::{COMPRESSED_IMAGE, RAW_IMAGE, Topic};
 use super::wire::{Fields, Message, Value};
-use crate::model::{DepthImage, PixelFormat, RawFrame, Size};
+use crate::model::{DepthImage, METRES_UNIT_M, PixelFormat, RawFrame, Size};
 use std::sync::Arc;
 
 /// Frame of reference that images and annotations name.
@@ -36,6 +36,8 @@ pub struct Picture {
 fn encoding_name(format: PixelFormat) -> Option<&'static str> {
     match format {
         PixelFormat::Mjpeg => None,
+        // Of depth; never a frame of its own.
+        PixelFormat::Z16 | PixelFormat::Y16 => Some(DEPTH_NAME),
         PixelFormat::Yuyv => Some("yuv422_yuy2"),
         PixelFormat::Uyvy => Some("uyvy"),
         PixelFormat::Nv12 => Some("nv12"),
@@ -62,7 +64,7 @@ fn format_of(name: &str) -> Option<PixelFormat> {
 fn step(format: PixelFormat, size: Size) -> u32 {
     size.width
         * match format {
-            PixelFormat::Yuyv | PixelFormat::Uyvy => 2,
+            PixelFormat::Yuyv | PixelFormat::Uyvy | PixelFormat::Z16 | PixelFormat::Y16 => 2,
             PixelFormat::Rgb24 => 3,
             PixelFormat::Mjpeg | PixelFormat::Nv12 | PixelFormat::Grey => 1,
         }
@@ -126,26 +128,48 @@ pub(super) fn encode_depth(depth: &DepthImage, log_time_ns: u64, into: &mut Vec<
 pub(super) struct DecodedDepth {
     pub time_ns: Option<i64>,
     pub image: DepthImage,
+    /// Metres for each count, where the message has metres and the unit is ours.
+    pub metres_unit_m: Option<f64>,
+}
+
+/// Numbers of four bytes, metres.
+pub(super) fn metres(bytes: &[u8], is_big_endian: bool) -> impl Iterator<Item = f32> {
+    let number = match is_big_endian {
+        true => f32::from_be_bytes,
+        false => f32::from_le_bytes,
+    };
+    bytes
+        .chunks_exact(4)
+        .map(move |b| number([b[0], b[1], b[2], b[3]]))
 }
 
 /// The depth image in a message of [`RAW_IMAGE`]; `None` if there is none that can be used.
 pub(super) fn decode_depth(message: &[u8]) -> Option<DecodedDepth> {
     let raw = Raw::read(message)?;
     let sides = 1..=MAX_SIDE_PX;
-    let is_depth = matches!(raw.name, DEPTH_NAME | "mono16");
-    if !is_depth || !sides.contains(&raw.width) || !sides.contains(&raw.height) {
+    let pixel_bytes = match raw.name {
+        DEPTH_NAME | "mono16" => 2,
+        "32FC1" => 4,
+        _ => return None,
+    };
+    if !sides.contains(&raw.width) || !sides.contains(&raw.height) {
         return None;
     }
-    let (line, height) = (2 * raw.width as usize, raw.height as usize);
+    let (line, height) = (pixel_bytes * raw.width as usize, raw.height as usize);
     let bytes = unpadded(raw.data?, raw.step.max(line), line, height);
-    let counts: Vec<u16> = bytes
-        .chunks_exact(2)
-        .map(|b| u16::from_le_bytes([b[0], b[1]]))
-        .collect();
     let size = Size::new(raw.width, raw.height);
-    let image = DepthImage { size, counts };
-    let time_ns = raw.time_ns;
-    (image.counts.len() == size.area()).then_some(DecodedDepth { time_ns, image })
+    if pixel_bytes == 4 {
+        return Some(DecodedDepth {
+            time_ns: raw.time_ns,
+            image: DepthImage::from_metres(size, metres(&bytes, false))?,
+            metres_unit_m: Some(METRES_UNIT_M),
+        });
+    }
+    Some(DecodedDepth {
+        time_ns: raw.time_ns,
+        image: DepthImage::from_bytes(size, &bytes)?,
+        metres_unit_m: None,
+    })
 }
 
 /// What a message holds.

@@ -2,8 +2,9 @@
 //! delivered (MCAP).
 //!
 //! A recording is written by [`Series`], which makes one file after another where a limit is set,
-//! and read by [`Reader`]. `docs/recordings.md` says what is in the files.
+//! and read by [`Reader`], as bags of ROS 1 are. `docs/recordings.md` says what is in the files.
 
+mod bag;
 mod channel;
 mod cursor;
 mod disk;
@@ -16,6 +17,7 @@ mod scene;
 mod schema;
 mod series;
 mod track_file;
+mod transforms;
 mod walk;
 mod wire;
 mod writer;
@@ -23,6 +25,7 @@ mod writer;
 pub use disk::SpaceReserve;
 pub use error::RecordingError;
 pub use image::{Encoding, Picture};
+pub use pairing::{AwaitsDepth, Pairing};
 pub use reader::{About, Reader};
 pub use series::{Head, Limits, Series};
 pub use track_file::{Sets, TrackFile, TrackFileReader};

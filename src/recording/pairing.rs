@@ -1,7 +1,7 @@
 //! Pictures and depth images that come in turns, each with its own time: which belong together.
 
 use super::image::Picture;
-use crate::model::{DEPTH_APART_S, DepthImage};
+use crate::model::{DEPTH_APART_S, DepthImage, RawFrame, nanoseconds};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -12,10 +12,38 @@ const PATIENCE_NS: i64 = 100_000_000;
 /// So many pictures and so many depth images are held at most.
 const HELD: usize = 8;
 
+/// What waits for its depth image.
+pub trait AwaitsDepth {
+    /// When it was taken, by the clock of the depth images, ns.
+    fn time_ns(&self) -> i64;
+    /// Gets the depth image that belongs to it.
+    fn set_depth(&mut self, depth: Arc<DepthImage>);
+}
+
+impl AwaitsDepth for Picture {
+    fn time_ns(&self) -> i64 {
+        self.sensor_time_ns
+    }
+
+    fn set_depth(&mut self, depth: Arc<DepthImage>) {
+        self.depth = Some(depth);
+    }
+}
+
+impl AwaitsDepth for RawFrame {
+    fn time_ns(&self) -> i64 {
+        nanoseconds(self.sensor_time_s)
+    }
+
+    fn set_depth(&mut self, depth: Arc<DepthImage>) {
+        self.depth = Some(depth);
+    }
+}
+
 /// Holds pictures back until it is known which depth image belongs to each.
-#[derive(Debug, Default)]
-pub struct Pairing {
-    pictures: VecDeque<Picture>,
+#[derive(Debug)]
+pub struct Pairing<P> {
+    pictures: VecDeque<P>,
     depths: VecDeque<Timed>,
     newest_ns: Option<i64>,
 }
@@ -26,10 +54,20 @@ struct Timed {
     image: Arc<DepthImage>,
 }
 
-impl Pairing {
+impl<P> Default for Pairing<P> {
+    fn default() -> Self {
+        Self {
+            pictures: VecDeque::new(),
+            depths: VecDeque::new(),
+            newest_ns: None,
+        }
+    }
+}
+
+impl<P: AwaitsDepth> Pairing<P> {
     /// Takes a picture.
-    pub fn picture(&mut self, picture: Picture) {
-        self.seen(picture.sensor_time_ns);
+    pub fn picture(&mut self, picture: P) {
+        self.seen(picture.time_ns());
         self.pictures.push_back(picture);
     }
 
@@ -47,8 +85,8 @@ impl Pairing {
     }
 
     /// The oldest picture with its depth image, if that is decided.
-    pub fn ready(&mut self) -> Option<Picture> {
-        let time_ns = self.pictures.front()?.sensor_time_ns;
+    pub fn ready(&mut self) -> Option<P> {
+        let time_ns = self.pictures.front()?.time_ns();
         let is_passed = self.depths.iter().any(|depth| depth.time_ns >= time_ns);
         let waited = self
             .newest_ns
@@ -61,20 +99,20 @@ impl Pairing {
     }
 
     /// The oldest picture with its depth image; there is nothing more to wait for.
-    pub fn oldest(&mut self) -> Option<Picture> {
+    pub fn oldest(&mut self) -> Option<P> {
         let mut picture = self.pictures.pop_front()?;
-        let time_ns = picture.sensor_time_ns;
+        let time_ns = picture.time_ns();
         let apart = |depth: &Timed| depth.time_ns.abs_diff(time_ns);
         let nearest = (0..self.depths.len()).min_by_key(|k| apart(&self.depths[*k]));
         let nearest = nearest.filter(|k| apart(&self.depths[*k]) <= APART_NS);
         // The next picture may be nearer to it.
-        let next = self.pictures.front().map(|next| next.sensor_time_ns);
+        let next = self.pictures.front().map(P::time_ns);
         let nearest = nearest.filter(|k| {
             let depth = &self.depths[*k];
             next.is_none_or(|next| apart(depth) <= depth.time_ns.abs_diff(next))
         });
         if let Some(k) = nearest {
-            picture.depth = Some(self.depths[k].image.clone());
+            picture.set_depth(self.depths[k].image.clone());
             // It and those before it belong to no later picture.
             self.depths.drain(..=k);
         }

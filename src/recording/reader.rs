@@ -1,17 +1,22 @@
-//! Reads the frames of a recording, its own or another program's, in their order.
+//! Reads the frames of a recording, its own or another program's (MCAP, or a bag of ROS 1), in their
+//! order.
 
-use super::channel::{Channel, Role, camera_topic, is_registered};
+use super::bag::{self, Bag, Connection, Found};
+use super::channel::{Channel, Role, camera_topic, is_of_realsense, is_registered};
 use super::cursor::Cursor;
 use super::error::RecordingError;
 use super::image::{Decoded, Picture, decode, decode_depth};
 use super::pairing::Pairing;
-use super::ros::{self, Kind, Layout, ROS_UNIT_M, RosCamera};
+use super::ros::{self, Kind, Layout, ROS_UNIT_M};
 use super::schema::{
     ABOUT, CAPTURED_AT, CLOCK, COUNTED, DEPTH_CAMERA_PX, DEPTH_UNIT_M, FILE_CLOCK, FIRST_SEQUENCE,
     NOTE, SEQUENCE, SHIFT_NS,
 };
-use super::walk::{Walk, read_up_to};
-use crate::model::{DepthImage, LocalTime, Origin, Pinhole, Size, UserNote, UserNotes};
+use super::transforms::Transforms;
+use super::walk::{Damage, Walk, read_up_to};
+use crate::model::{
+    CameraModel, DepthImage, DepthRig, LocalTime, Origin, Pinhole, Size, UserNote, UserNotes,
+};
 use mcap::records::op;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -23,6 +28,8 @@ use std::sync::Arc;
 const FOOTER: u64 = 9 + 20 + 8;
 /// A summary beyond this is not read; the file can be without.
 const MAX_SUMMARY: u64 = 1 << 28;
+/// By how much two cameras of the same view may differ, as a share.
+const SAME_CAMERA: f64 = 0.01;
 
 /// What a recording says of itself, by the keys of `docs/recordings.md`; empty for another
 /// program's.
@@ -40,17 +47,85 @@ struct ForeignDepth {
     /// The topic that is taken.
     topic: Option<String>,
     /// Cameras by topic.
-    cameras: BTreeMap<String, RosCamera>,
-    pairing: Pairing,
+    cameras: BTreeMap<String, CameraModel>,
+    pairing: Pairing<Picture>,
     /// Frames of reference that depth and pictures name.
     depth_frame: Option<String>,
     picture_frame: Option<String>,
+    transforms: Transforms,
+    /// Metres for each count, as the first depth image says, and whether that is for us to say.
+    unit_m: Option<f64>,
+    is_in_metres: bool,
+}
+
+/// The records of a file.
+enum Records<R> {
+    Mcap(Box<Walk<R>>),
+    Bag(Box<Bag<R>>),
+}
+
+/// A record as both formats have it.
+enum Record {
+    Message(MessageHead),
+    Connection(Connection),
+    /// A record of this kind of MCAP that is no message.
+    Note(u8),
+}
+
+impl<R: Read + Seek> Records<R> {
+    fn next(&mut self) -> io::Result<Option<Record>> {
+        match self {
+            Self::Mcap(walk) => {
+                let Some(kind) = walk.next()? else {
+                    return Ok(None);
+                };
+                if kind != op::MESSAGE {
+                    return Ok(Some(Record::Note(kind)));
+                }
+                let head = MessageHead::read(&mut Cursor(walk.body()));
+                Ok(Some(head.map_or(Record::Note(kind), Record::Message)))
+            }
+            Self::Bag(bag) => Ok(bag.next()?.map(|found| match found {
+                Found::Connection(connection) => Record::Connection(connection),
+                Found::Message {
+                    connection,
+                    time_ns,
+                } => Record::Message(MessageHead::of_bag(connection, time_ns)),
+            })),
+        }
+    }
+
+    /// All of a record that is no message.
+    fn body(&self) -> &[u8] {
+        match self {
+            Self::Mcap(walk) => walk.body(),
+            Self::Bag(bag) => bag.content(),
+        }
+    }
+
+    /// The content of a message.
+    fn content(&self) -> &[u8] {
+        match self {
+            Self::Mcap(walk) => {
+                let mut body = Cursor(walk.body());
+                MessageHead::read(&mut body).map_or(&[], |_| body.0)
+            }
+            Self::Bag(bag) => bag.content(),
+        }
+    }
+
+    fn damage(&self) -> Damage {
+        match self {
+            Self::Mcap(walk) => walk.damage,
+            Self::Bag(bag) => bag.damage,
+        }
+    }
 }
 
 /// A recording that is being read.
 pub struct Reader<R = File> {
     path: PathBuf,
-    walk: Walk<R>,
+    records: Records<R>,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
     about: About,
@@ -86,20 +161,57 @@ impl<R: Read + Seek> Reader<R> {
     /// # Errors
     /// As for [`Reader::open`].
     pub fn new(path: &Path, mut file: R) -> Result<Self, RecordingError> {
+        let unreadable = |source| RecordingError::unreadable(path, source);
+        let first = first_bytes(&mut file).map_err(unreadable)?;
+        if first.starts_with(bag::ANY_MAGIC) {
+            return Self::of_bag(path, file, first == bag::MAGIC);
+        }
         // The summary at the end is a help, not a condition.
-        let summary = summary(&mut file)
-            .map_err(|source| RecordingError::unreadable(path, source))?
-            .unwrap_or_default();
-        let walk = Walk::new(file).map_err(|source| RecordingError::unreadable(path, source))?;
-        let Some(walk) = walk else {
+        let summary = summary(&mut file).map_err(unreadable)?.unwrap_or_default();
+        let Some(walk) = Walk::new(file).map_err(unreadable)? else {
             return Err(RecordingError::unusable(
                 path,
-                "it does not begin as a recording (MCAP) does; give a file that `record` made",
+                "it does not begin as a recording (MCAP, or a bag of ROS 1) does; give a file that \
+                 `record` made",
             ));
         };
-        let mut reader = Self {
+        let mut reader = Self::of_records(path, Records::Mcap(Box::new(walk)));
+        let mut rest = Cursor(&summary);
+        while let Some((kind, body)) = rest.record() {
+            reader.note(kind, body);
+        }
+        reader.check_series("mcap filter -y TOPIC")?;
+        Ok(reader)
+    }
+
+    /// Reads a bag of ROS 1.
+    fn of_bag(path: &Path, file: R, is_known: bool) -> Result<Self, RecordingError> {
+        if !is_known {
+            return Err(RecordingError::unusable(
+                path,
+                "it is a bag of an old format; convert it with `rosbag migrate`",
+            ));
+        }
+        let unreadable = |source| RecordingError::unreadable(path, source);
+        let mut bag = Bag::new(file).map_err(unreadable)?;
+        let index = bag.index().map_err(unreadable)?;
+        let mut reader = Self::of_records(path, Records::Bag(Box::new(bag)));
+        for connection in index.connections {
+            reader.note_connection(connection);
+        }
+        for count in index.counts {
+            if let Ok(id) = u16::try_from(count.connection) {
+                *reader.counts.entry(id).or_insert(0) += count.messages;
+            }
+        }
+        reader.check_series("rosbag filter IN.bag OUT.bag 'topic == \"TOPIC\"'")?;
+        Ok(reader)
+    }
+
+    fn of_records(path: &Path, records: Records<R>) -> Self {
+        Self {
             path: path.to_owned(),
-            walk,
+            records,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             about: About::new(),
@@ -113,12 +225,14 @@ impl<R: Read + Seek> Reader<R> {
             wants_depth: true,
             own_depth: None,
             foreign_depth: ForeignDepth::default(),
-        };
-        let mut rest = Cursor(&summary);
-        while let Some((kind, body)) = rest.record() {
-            reader.note(kind, body);
         }
-        let foreign: BTreeSet<&str> = reader
+    }
+
+    /// Makes sure that it is known which series of pictures and of depth are meant; `filter` keeps
+    /// one.
+    fn check_series(&self, filter: &str) -> Result<(), RecordingError> {
+        let path = &self.path;
+        let foreign: BTreeSet<&str> = self
             .channels
             .values()
             .filter(|c| c.role() == Role::Picture && c.counted.is_none())
@@ -127,21 +241,20 @@ impl<R: Read + Seek> Reader<R> {
         if foreign.len() > 1 {
             let topics = foreign.into_iter().collect::<Vec<_>>().join(", ");
             let what = format!(
-                "it has several series of pictures ({topics}); keep one, e.g. with \
-                 `mcap filter -y TOPIC`"
+                "it has several series of pictures ({topics}); keep one, e.g. with `{filter}`"
             );
             return Err(RecordingError::unusable(path, what));
         }
-        let depths = reader.depth_topics();
+        let depths = self.depth_topics();
         if depths.len() > 1 {
             let what = format!(
                 "it has several series of depth ({}); keep the one that is registered with the \
-                 pictures, e.g. with `mcap filter -y TOPIC`",
+                 pictures, e.g. with `{filter}`",
                 depths.join(", ")
             );
             return Err(RecordingError::unusable(path, what));
         }
-        Ok(reader)
+        Ok(())
     }
 
     /// Topics of depth that may be taken: those that say to be registered with the pictures, if there
@@ -171,7 +284,13 @@ impl<R: Read + Seek> Reader<R> {
     pub fn depth_unit_m(&self) -> Option<f64> {
         let is_ros = |c: &Channel| c.role() == Role::Depth && c.layout.is_some();
         let of_ros = self.channels.values().any(is_ros).then_some(ROS_UNIT_M);
-        self.number(DEPTH_UNIT_M).or(of_ros)
+        let said = self.foreign_depth.unit_m;
+        self.number(DEPTH_UNIT_M).or(said).or(of_ros)
+    }
+
+    /// Whether the depth came in metres, and its unit is how they are counted here.
+    pub fn is_depth_in_metres(&self) -> bool {
+        self.foreign_depth.is_in_metres
     }
 
     /// The colour camera for pictures of this size; `None` where the recording does not say.
@@ -187,25 +306,71 @@ impl<R: Read + Seek> Reader<R> {
         if own.is_valid() {
             return Some(own);
         }
-        let foreign = &self.foreign_depth;
-        let beside = foreign.topic.as_deref().and_then(camera_topic);
-        let of_pictures = self.chosen.as_deref().and_then(camera_topic);
-        let camera = [beside, of_pictures]
-            .into_iter()
-            .flatten()
-            .find_map(|topic| foreign.cameras.get(&topic));
-        camera.map(|camera| camera.for_size(picture))
+        let camera = match self.is_depth_elsewhere() {
+            true => self.picture_camera(),
+            false => self.own_depth_camera().or(self.picture_camera()),
+        };
+        camera.map(|camera| camera.for_size(picture).pinhole)
     }
 
-    /// The frames of reference of depth and pictures, where they are not the same: the depth is not
-    /// registered with the pictures.
+    /// The camera beside the depth's topic, and that beside the pictures'.
+    fn own_depth_camera(&self) -> Option<CameraModel> {
+        self.camera_beside(self.foreign_depth.topic.as_deref()?)
+    }
+
+    fn picture_camera(&self) -> Option<CameraModel> {
+        self.camera_beside(self.chosen.as_deref()?)
+    }
+
+    fn camera_beside(&self, topic: &str) -> Option<CameraModel> {
+        let camera = camera_topic(topic)?;
+        self.foreign_depth.cameras.get(&camera).copied()
+    }
+
+    /// Whether the depth is not registered with the pictures, as far as is known by now.
+    fn is_depth_elsewhere(&self) -> bool {
+        let topic = self.foreign_depth.topic.as_deref().unwrap_or_default();
+        is_of_realsense(topic) && !is_registered(topic) || self.depth_misfit().is_some()
+    }
+
+    /// The cameras of depth and of pictures, where the depth is not registered with the pictures and
+    /// the recording says where both stand.
+    pub fn depth_rig(&self) -> Option<DepthRig> {
+        if !self.is_depth_elsewhere() {
+            return None;
+        }
+        let foreign = &self.foreign_depth;
+        let (from, to) = (foreign.topic.as_deref()?, self.chosen.as_deref()?);
+        let by_topics = foreign.transforms.between_topics(from, to);
+        let colour_from_depth = by_topics.or_else(|| {
+            let (from, to) = (
+                foreign.depth_frame.as_ref()?,
+                foreign.picture_frame.as_ref()?,
+            );
+            foreign.transforms.between_frames(from, to)
+        })?;
+        Some(DepthRig {
+            depth: self.own_depth_camera()?,
+            colour: self.picture_camera()?,
+            colour_from_depth,
+        })
+    }
+
+    /// What shows that the depth is not registered with the pictures: both name other frames of
+    /// reference, or have other cameras.
     pub fn depth_misfit(&self) -> Option<String> {
         let foreign = &self.foreign_depth;
-        let (depth, picture) = (
-            foreign.depth_frame.as_ref()?,
-            foreign.picture_frame.as_ref()?,
-        );
-        (depth != picture).then(|| format!("{depth} and {picture}"))
+        let frames = foreign
+            .depth_frame
+            .as_ref()
+            .zip(foreign.picture_frame.as_ref());
+        if let Some((depth, picture)) = frames.filter(|(depth, picture)| depth != picture) {
+            return Some(format!("frames {depth} and {picture}"));
+        }
+        let topic = foreign.topic.as_deref().filter(|t| !is_registered(t))?;
+        let (depth, picture) = (self.camera_beside(topic)?, self.picture_camera()?);
+        let differ = !is_same_view(&depth.for_size(picture.size), &picture);
+        differ.then(|| "its camera is another one".to_owned())
     }
 
     /// What the recording says of itself; complete from the first picture on.
@@ -267,51 +432,53 @@ impl<R: Read + Seek> Reader<R> {
             if let Some(picture) = self.foreign_depth.pairing.ready() {
                 return Some(picture);
             }
-            let kind = match self.walk.next() {
-                Ok(Some(kind)) => kind,
+            let record = match self.records.next() {
+                Ok(Some(record)) => record,
                 Ok(None) => return self.foreign_depth.pairing.oldest(),
                 Err(e) => {
                     self.broken = Some(e.to_string());
                     return self.foreign_depth.pairing.oldest();
                 }
             };
-            if kind == op::MESSAGE {
-                if let Some(picture) = self.message() {
-                    return Some(picture);
+            match record {
+                Record::Message(head) => {
+                    if let Some(picture) = self.message(&head) {
+                        return Some(picture);
+                    }
                 }
-            } else {
-                let body = self.walk.body().to_vec();
-                self.note(kind, &body);
+                Record::Connection(connection) => self.note_connection(connection),
+                Record::Note(kind) => {
+                    let body = self.records.body().to_vec();
+                    self.note(kind, &body);
+                }
             }
         }
     }
 
     /// The picture in the message that was just found, if it is one and wanted. Depth is kept for its
     /// picture, and a picture of another program for its depth.
-    fn message(&mut self) -> Option<Picture> {
-        let mut body = Cursor(self.walk.body());
-        let head = MessageHead::read(&mut body)?;
+    fn message(&mut self, head: &MessageHead) -> Option<Picture> {
         let role = self.channels.get(&head.channel)?.role();
         match role {
             Role::Picture => {
-                let picture = self.picture(&head)?;
+                let picture = self.picture(head)?;
                 let is_own = self.channels.get(&head.channel)?.counted.is_some();
                 if is_own || !self.has_depth() {
                     return Some(picture);
                 }
                 self.foreign_depth.pairing.picture(picture);
             }
-            Role::Depth if self.wants_depth => self.depth(&head),
-            Role::Camera if self.wants_depth => self.camera(&head),
-            Role::Depth | Role::Camera | Role::Other => {}
+            Role::Depth if self.wants_depth => self.depth(head),
+            Role::Camera if self.wants_depth => self.camera(head),
+            Role::Transform if self.wants_depth => self.transform(head),
+            Role::Depth | Role::Camera | Role::Transform | Role::Other => {}
         }
         None
     }
 
     /// The content of the message that was just found.
     fn content(&self) -> &[u8] {
-        let mut body = Cursor(self.walk.body());
-        MessageHead::read(&mut body).map_or(&[], |_| body.0)
+        self.records.content()
     }
 
     /// Keeps a depth image.
@@ -342,11 +509,15 @@ impl<R: Read + Seek> Reader<R> {
                 time_ns: Some(read.stamp.time_ns),
                 frame: Some(read.stamp.frame_id),
                 image: read.image,
+                unit_m: Some(read.unit_m),
+                is_in_metres: read.is_in_metres,
             }),
             None => decode_depth(self.content()).map(|read| TimedDepth {
                 time_ns: read.time_ns,
                 frame: None,
                 image: read.image,
+                unit_m: read.metres_unit_m,
+                is_in_metres: read.metres_unit_m.is_some(),
             }),
         };
         let Some(read) = read else {
@@ -354,6 +525,9 @@ impl<R: Read + Seek> Reader<R> {
             return;
         };
         let foreign = &mut self.foreign_depth;
+        if foreign.unit_m.is_none() {
+            (foreign.unit_m, foreign.is_in_metres) = (read.unit_m, read.is_in_metres);
+        }
         let frame = read.frame.filter(|frame| !frame.is_empty());
         foreign.depth_frame = foreign.depth_frame.take().or(frame);
         let log_ns = i64::try_from(head.log_ns).ok();
@@ -371,6 +545,24 @@ impl<R: Read + Seek> Reader<R> {
         if let Some(camera) = ros::camera(layout, self.content()) {
             let topic = channel.topic.clone();
             self.foreign_depth.cameras.entry(topic).or_insert(camera);
+        }
+    }
+
+    /// Keeps where something stands.
+    fn transform(&mut self, head: &MessageHead) {
+        let channel = self.channels.get(&head.channel);
+        let Some((channel, layout)) = channel.and_then(|c| Some((c, c.layout?))) else {
+            return;
+        };
+        let (topic, kind) = (channel.topic.clone(), Kind::of(&channel.schema));
+        if kind == Some(Kind::Transform) {
+            if let Some(transform) = ros::transform(layout, self.content()) {
+                self.foreign_depth.transforms.add_stream(&topic, transform);
+            }
+            return;
+        }
+        for transform in ros::transforms(layout, self.content()) {
+            self.foreign_depth.transforms.add_frame(transform);
         }
     }
 
@@ -499,6 +691,21 @@ impl<R: Read + Seek> Reader<R> {
         Some(())
     }
 
+    fn note_connection(&mut self, connection: Connection) {
+        // One of more than that many is none of a film's.
+        if let Ok(id) = u16::try_from(connection.id)
+            && id != u16::MAX
+        {
+            let channel = Channel {
+                topic: connection.topic,
+                schema: connection.kind,
+                layout: Some(Layout::Ros1),
+                counted: None,
+            };
+            self.channels.insert(id, channel);
+        }
+    }
+
     fn note_metadata(&mut self, body: &[u8]) -> Option<()> {
         let mut body = Cursor(body);
         if body.text()? == ABOUT {
@@ -523,7 +730,7 @@ impl<R: Read + Seek> Reader<R> {
 
     /// What could not be read, a line each; complete after the end.
     pub fn warnings(&self) -> Vec<String> {
-        let (name, damage) = (self.path.display(), self.walk.damage);
+        let (name, damage) = (self.path.display(), self.records.damage());
         let mut lines = Vec::new();
         if damage.parts > 0 {
             let (parts, bytes) = (damage.parts, damage.bytes);
@@ -572,6 +779,17 @@ struct MessageHead {
 }
 
 impl MessageHead {
+    /// Of a message of ROS 1, which has no number.
+    fn of_bag(connection: u32, time_ns: u64) -> Self {
+        Self {
+            // None has the last one.
+            channel: u16::try_from(connection).unwrap_or(u16::MAX),
+            number: 0,
+            log_ns: time_ns,
+            publish_ns: time_ns,
+        }
+    }
+
     fn read(body: &mut Cursor) -> Option<Self> {
         Some(Self {
             channel: body.u16()?,
@@ -587,6 +805,28 @@ struct TimedDepth {
     time_ns: Option<i64>,
     frame: Option<String>,
     image: DepthImage,
+    unit_m: Option<f64>,
+    is_in_metres: bool,
+}
+
+/// Whether two cameras for images of one size show the same.
+fn is_same_view(a: &CameraModel, b: &CameraModel) -> bool {
+    let focal = a.pinhole.focal_px.component_div(&b.pinhole.focal_px);
+    let shift = a.pinhole.middle_px - b.pinhole.middle_px;
+    let sides = [f64::from(b.size.width), f64::from(b.size.height)];
+    focal.iter().all(|share| (share - 1.0).abs() <= SAME_CAMERA)
+        && shift.x.abs() <= SAME_CAMERA * sides[0]
+        && shift.y.abs() <= SAME_CAMERA * sides[1]
+}
+
+/// As many bytes from the beginning of a file as a bag of ROS says what it is with.
+fn first_bytes(file: &mut (impl Read + Seek)) -> io::Result<Vec<u8>> {
+    file.seek(SeekFrom::Start(0))?;
+    let mut bytes = vec![0; bag::MAGIC.len()];
+    let read = read_up_to(file, &mut bytes)?;
+    bytes.truncate(read);
+    file.seek(SeekFrom::Start(0))?;
+    Ok(bytes)
 }
 
 /// The records at the end of a file that was ended properly.

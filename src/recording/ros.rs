@@ -1,12 +1,19 @@
 //! Messages of ROS with pictures, depth and cameras, as ROS 1 and ROS 2 write them: `sensor_msgs/Image`,
-//! `CompressedImage` and `CameraInfo`.
+//! `CompressedImage` and `CameraInfo`, and transforms.
 
-use super::image::{Encoding, MAX_SIDE_PX};
-use crate::model::{DepthImage, Pinhole, PixelFormat, Size};
-use nalgebra::{Point2, Vector2};
+use super::image::{Encoding, MAX_SIDE_PX, metres};
+use super::transforms::plain_frame;
+use crate::model::{CameraModel, DepthImage, METRES_UNIT_M, Pinhole, PixelFormat, Size};
+use nalgebra::{Isometry3, Point2, Quaternion, Translation3, UnitQuaternion, Vector2};
 
 /// Metres for each count of 16 bits of depth (REP 118).
 pub const ROS_UNIT_M: f64 = 0.001;
+/// The frame of reference in images of a RealSense camera that give the unit of their depth.
+const WITH_UNIT: &str = "1";
+/// Units of depth that may be true, m.
+const UNITS_M: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
+/// Transforms in one message at most.
+const MOST_TRANSFORMS: u32 = 1000;
 
 /// How the fields of a message follow each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +30,9 @@ pub enum Kind {
     Image,
     CompressedImage,
     CameraInfo,
+    /// One transform, whose frames are not named.
+    Transform,
+    Transforms,
 }
 
 impl Kind {
@@ -34,6 +44,10 @@ impl Kind {
                 Some(Self::CompressedImage)
             }
             "sensor_msgs/CameraInfo" | "sensor_msgs/msg/CameraInfo" => Some(Self::CameraInfo),
+            "geometry_msgs/Transform" | "geometry_msgs/msg/Transform" => Some(Self::Transform),
+            "tf2_msgs/TFMessage" | "tf2_msgs/msg/TFMessage" | "tf/tfMessage" => {
+                Some(Self::Transforms)
+            }
             _ => None,
         }
     }
@@ -60,30 +74,18 @@ pub struct RosPicture {
 pub struct RosDepth {
     pub stamp: Stamp,
     pub image: DepthImage,
+    /// Metres for each count.
+    pub unit_m: f64,
+    /// The message has metres: the unit is ours.
+    pub is_in_metres: bool,
 }
 
-/// A camera for pictures of a size.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RosCamera {
-    pub size: Size,
-    pub pinhole: Pinhole,
-}
-
-impl RosCamera {
-    /// The same for pictures of another size with the same view.
-    pub fn for_size(&self, size: Size) -> Pinhole {
-        let scale = Vector2::new(
-            f64::from(size.width) / f64::from(self.size.width),
-            f64::from(size.height) / f64::from(self.size.height),
-        );
-        let half = Vector2::repeat(0.5);
-        // Pixels are counted from the middle of the first one.
-        let middle_px = (self.pinhole.middle_px + half).coords;
-        Pinhole {
-            focal_px: self.pinhole.focal_px.component_mul(&scale),
-            middle_px: Point2::from(middle_px.component_mul(&scale) - half),
-        }
-    }
+/// Where a frame of reference stands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameTransform {
+    pub parent: String,
+    pub child: String,
+    pub parent_from_child: Isometry3<f64>,
 }
 
 /// The picture in a message of an image; `None` where it holds none that can be used.
@@ -106,7 +108,9 @@ pub fn picture(kind: Kind, layout: Layout, message: &[u8]) -> Option<RosPicture>
         "bgr8" | "8UC3" => (PixelFormat::Rgb24, swapped(image.rows(3)?)),
         "mono8" | "8UC1" => (PixelFormat::Grey, image.rows(1)?),
         "yuv422" | "uyvy" => (PixelFormat::Uyvy, image.rows(2)?),
-        "yuv422_yuy2" => (PixelFormat::Yuyv, image.rows(2)?),
+        "yuv422_yuy2" | "yuyv" | "YUYV" => (PixelFormat::Yuyv, image.rows(2)?),
+        "rgba8" => (PixelFormat::Rgb24, without_alpha(&image.rows(4)?)),
+        "bgra8" | "8UC4" => (PixelFormat::Rgb24, swapped(without_alpha(&image.rows(4)?))),
         _ => return None,
     };
     let encoding = Encoding::Pixels(format, image.size);
@@ -117,14 +121,28 @@ pub fn picture(kind: Kind, layout: Layout, message: &[u8]) -> Option<RosPicture>
     })
 }
 
-/// The depth image in a message; `None` where it holds none of 16 bits.
+/// The depth image in a message; `None` where it holds none of 16 bits, or of metres (`32FC1`).
 pub fn depth(layout: Layout, message: &[u8]) -> Option<RosDepth> {
     let mut fields = Fields::new(message, layout)?;
     let stamp = fields.stamp()?;
     let image = fields.image()?;
-    if !matches!(image.encoding, "16UC1" | "mono16") {
+    if image.encoding == "32FC1" {
+        let rows = image.rows(4)?;
+        return Some(RosDepth {
+            stamp,
+            image: DepthImage::from_metres(image.size, metres(&rows, image.is_big_endian))?,
+            unit_m: METRES_UNIT_M,
+            is_in_metres: true,
+        });
+    }
+    if !matches!(image.encoding, "16UC1" | "mono16" | "Z16") {
         return None;
     }
+    // A RealSense camera appends the unit.
+    let said_m = (stamp.frame_id == WITH_UNIT)
+        .then(|| fields.f32())
+        .flatten();
+    let said_m = said_m.map(f64::from).filter(|m| UNITS_M.contains(m));
     let number = match image.is_big_endian {
         true => u16::from_be_bytes,
         false => u16::from_le_bytes,
@@ -132,20 +150,29 @@ pub fn depth(layout: Layout, message: &[u8]) -> Option<RosDepth> {
     let rows = image.rows(2)?;
     let counts = rows.chunks_exact(2).map(|b| number([b[0], b[1]])).collect();
     let size = image.size;
-    let image = DepthImage { size, counts };
-    Some(RosDepth { stamp, image })
+    Some(RosDepth {
+        stamp,
+        image: DepthImage { size, counts },
+        unit_m: said_m.unwrap_or(ROS_UNIT_M),
+        is_in_metres: false,
+    })
 }
 
 /// The camera in a message; `None` where it is none, e.g. not calibrated.
-pub fn camera(layout: Layout, message: &[u8]) -> Option<RosCamera> {
+pub fn camera(layout: Layout, message: &[u8]) -> Option<CameraModel> {
     let mut fields = Fields::new(message, layout)?;
     fields.stamp()?;
     let (height, width) = (fields.u32()?, fields.u32()?);
-    // The model of the distortion and its coefficients: depth images are without any.
-    fields.text()?;
+    let model = fields.text()?;
+    // These two are OpenCV's, with the same order of coefficients.
+    let is_known = matches!(model, "plumb_bob" | "rational_polynomial");
+    let mut distortion = [0.0; 8];
     let coefficients = fields.u32()?;
-    for _ in 0..coefficients {
-        fields.f64()?;
+    for k in 0..coefficients as usize {
+        let coefficient = fields.f64()?;
+        if let Some(known) = distortion.get_mut(k).filter(|_| is_known) {
+            *known = coefficient;
+        }
     }
     let mut k = [0.0; 9];
     for k in &mut k {
@@ -155,8 +182,41 @@ pub fn camera(layout: Layout, message: &[u8]) -> Option<RosCamera> {
         focal_px: Vector2::new(k[0], k[4]),
         middle_px: Point2::new(k[2], k[5]),
     };
-    let size = Size::new(width, height);
-    (pinhole.is_valid() && width > 0 && height > 0).then_some(RosCamera { size, pinhole })
+    let camera = CameraModel {
+        size: Size::new(width, height),
+        pinhole,
+        distortion,
+    };
+    camera.is_valid().then_some(camera)
+}
+
+/// The transform in a message of one.
+pub fn transform(layout: Layout, message: &[u8]) -> Option<Isometry3<f64>> {
+    Fields::new(message, layout)?.transform()
+}
+
+/// The transforms in a message of several, as far as they can be read.
+pub fn transforms(layout: Layout, message: &[u8]) -> Vec<FrameTransform> {
+    let mut found = Vec::new();
+    let Some(mut fields) = Fields::new(message, layout) else {
+        return found;
+    };
+    let count = fields.u32().unwrap_or(0).min(MOST_TRANSFORMS);
+    for _ in 0..count {
+        let Some(transform) = fields.frame_transform() else {
+            break;
+        };
+        found.push(transform);
+    }
+    found
+}
+
+fn without_alpha(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len() / 4 * 3);
+    for pixel in bytes.chunks_exact(4) {
+        out.extend_from_slice(&pixel[..3]);
+    }
+    out
 }
 
 /// Blue first to red first.
@@ -248,8 +308,32 @@ impl<'a> Fields<'a> {
         self.number().map(u32::from_le_bytes)
     }
 
+    fn f32(&mut self) -> Option<f32> {
+        self.number().map(f32::from_le_bytes)
+    }
+
     fn f64(&mut self) -> Option<f64> {
         self.number().map(f64::from_le_bytes)
+    }
+
+    /// A shift and a turn; `None` where the turn is none.
+    fn transform(&mut self) -> Option<Isometry3<f64>> {
+        let shift = Translation3::new(self.f64()?, self.f64()?, self.f64()?);
+        let (i, j, k, w) = (self.f64()?, self.f64()?, self.f64()?, self.f64()?);
+        let turn = Quaternion::new(w, i, j, k);
+        let is_turn = (turn.norm() - 1.0).abs() < 0.01;
+        let is_known = is_turn && shift.vector.iter().all(|x| x.is_finite());
+        is_known.then(|| Isometry3::from_parts(shift, UnitQuaternion::from_quaternion(turn)))
+    }
+
+    fn frame_transform(&mut self) -> Option<FrameTransform> {
+        let parent = plain_frame(&self.stamp()?.frame_id).to_owned();
+        let child = plain_frame(self.text()?).to_owned();
+        Some(FrameTransform {
+            parent,
+            child,
+            parent_from_child: self.transform()?,
+        })
     }
 
     fn counted(&mut self) -> Option<&'a [u8]> {
@@ -381,6 +465,13 @@ mod tests {
                 picture(Kind::Image, layout, &image(layout, "32FC1", 12, &data)),
                 None
             );
+            let mut data = Vec::new();
+            for depth_m in [1.5_f32, f32::NAN, 0.0, 2.25, f32::INFINITY, 80.0] {
+                data.extend(depth_m.to_le_bytes());
+            }
+            let read = depth(layout, &image(layout, "32FC1", 12, &data)).expect("depth");
+            assert_eq!(read.image.counts, [1500, 0, 0, 2250, 0, 0]);
+            assert!(read.is_in_metres);
         }
     }
 
@@ -406,10 +497,33 @@ mod tests {
             assert_eq!(read.size, Size::new(640, 480));
             assert_eq!(read.pinhole.focal_px, Vector2::new(600.0, 601.0));
             assert_eq!(read.pinhole.middle_px, Point2::new(319.5, 239.5));
-            let larger = read.for_size(Size::new(1280, 960));
+            assert_eq!(read.distortion[..5], [0.1, 0.2, 0.3, 0.4, 0.5]);
+            let larger = read.for_size(Size::new(1280, 960)).pinhole;
             assert_eq!(larger.focal_px, Vector2::new(1200.0, 1202.0));
             assert_eq!(larger.middle_px, Point2::new(639.5, 479.5));
             assert_eq!(camera(layout, &message(0.0)), None);
+        }
+    }
+
+    #[test]
+    fn transforms_are_read_and_a_turn_that_is_none_is_left_out() {
+        for layout in [Layout::Ros1, Layout::Ros2] {
+            let message = |turn: [f64; 4]| {
+                let mut w = Writer::new(layout);
+                w.u32(1);
+                w.head();
+                w.text("/depth");
+                for x in [0.1, 0.2, 0.3].into_iter().chain(turn) {
+                    w.f64(x);
+                }
+                w.done()
+            };
+            let read = transforms(layout, &message([0.0, 0.0, 1.0, 0.0]));
+            assert_eq!(read.len(), 1);
+            assert_eq!((&*read[0].parent, &*read[0].child), ("camera", "depth"));
+            let place = read[0].parent_from_child * nalgebra::Point3::new(1.0, 0.0, 0.0);
+            assert!((place - nalgebra::Point3::new(-0.9, 0.2, 0.3)).norm() < 1e-12);
+            assert_eq!(transforms(layout, &message([0.0; 4])), []);
         }
     }
 

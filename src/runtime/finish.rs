@@ -451,6 +451,7 @@ pub(super) fn timing(job: &CaptureJob) -> Timing {
         frames_undecodable: count(&counts.undecodable),
         frames_before_outline: count(&counts.before_outline),
         frames_not_recorded: count(&counts.not_recorded),
+        depth: camera.depth.map(|depth| depth.counts),
         duration_s,
         ..job.shared.gaps()
     }

@@ -1,6 +1,7 @@
 //! The pipeline on threads: source, tracker, model. Queues between them are bounded.
 //!
 //! ```text
+//! depth camera --(8 images; newest kept)--> source, where there is one beside the camera
 //! source --(4 frames; live: newest kept)--> track --(64 track sets)--> model --(newest state only)--> screen
 //!        \--(512 entries, 96 MB; live: what does not fit is counted)--> record <--/
 //! ```
@@ -15,6 +16,7 @@ mod announce;
 mod asked;
 mod background;
 mod capture_tables;
+mod depth_camera;
 mod depth_scale;
 mod finish;
 mod first_picture;
@@ -70,6 +72,7 @@ use crate::pipeline::{DecodeStage, FrontEnd};
 use crate::source::Source;
 use background::Beside;
 use crossbeam_channel::{Sender, bounded, unbounded};
+use depth_camera::WithDepth;
 use model_thread::ModelThread;
 use shared::{Shared, StopAll};
 use source_thread::FRAME_QUEUE;
@@ -96,10 +99,12 @@ pub struct Running {
 ///
 /// # Errors
 /// A thread cannot be started, there is no decoder, or the recording cannot be made.
-pub fn start(source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
-    let limit = job.config.camera.time_limit();
-    let source = Watched::if_live(source, limit).map_err(Failure::Thread)?;
+pub fn start(mut source: Box<dyn Source>, mut job: Job) -> Result<Running, Failure> {
+    let settings = &job.config.camera;
+    let depth = source.take_depth_camera();
+    let source = Watched::if_live(source, settings.time_limit()).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
+    let source = WithDepth::if_there(source, depth, settings, &shared)?;
     shared.set_origin(Origin {
         captured_at: source.origin().captured_at,
         notes: job.notes.clone(),

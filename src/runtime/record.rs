@@ -1,5 +1,6 @@
 //! Frames into a file and nothing else: source and recorder, without tracker and model.
 
+use super::depth_camera::WithDepth;
 use super::recorder_thread::{self, RecordTo, Recorded};
 use super::shared::{Failure, Shared, StopAll};
 use super::source_thread::{self, FRAME_QUEUE, Pace};
@@ -32,9 +33,11 @@ pub struct RunningRecord {
 ///
 /// # Errors
 /// The file cannot be made, or a thread cannot be started.
-pub fn record(source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
+pub fn record(mut source: Box<dyn Source>, job: RecordJob) -> Result<RunningRecord, Failure> {
+    let depth = source.take_depth_camera();
     let source = Watched::if_live(source, job.camera.time_limit()).map_err(Failure::Thread)?;
     let shared = Arc::new(Shared::default());
+    let source = WithDepth::if_there(source, depth, &job.camera, &shared)?;
     shared.set_origin(source.origin());
     let (recorder, recording) = recorder_thread::start(job.to, source.describe().live, &shared)?;
     let (frames_in, frames_out) = bounded::<TimedFrame>(FRAME_QUEUE);

@@ -5,7 +5,7 @@ use super::pulse::Pulse;
 use crate::config::Config;
 use crate::files::WriteError;
 use crate::markers::MarkerError;
-use crate::model::{CameraState, Gap, LocalTime, Origin, Snapshot, Timing};
+use crate::model::{CameraState, DepthCameraState, Gap, LocalTime, Origin, Snapshot, Timing};
 use crate::recording::RecordingError;
 use crate::source::{ClockKind, DecodeError, SourceError};
 use crate::views::PrepareError;
@@ -167,6 +167,9 @@ impl Shared {
             camera.stale = timing.frames_stale;
             camera.reconnects = timing.reconnects;
             camera.away_s = timing.away_s;
+            camera.depth = timing
+                .depth
+                .map(|counts| DepthCameraState { away: None, counts });
             camera.clock = clocks
                 .into_iter()
                 .find(|c| *c == timing.clock)

@@ -122,8 +122,11 @@ fn counts(shared: &Shared) -> String {
     let by_sequence = c
         .lost_by_sequence
         .map_or_else(|| "null".to_owned(), |n| n.to_string());
+    let depth = c.depth.map_or(String::new(), |depth| {
+        format!(",\"without_depth\":{}", depth.counts.frames_without)
+    });
     format!(
-        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}",
+        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}{depth}",
         shared.counts.lost_in_camera.load(Ordering::Relaxed),
         c.lost_by_time,
         c.damaged + c.stale + shared.counts.undecodable.load(Ordering::Relaxed),

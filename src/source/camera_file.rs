@@ -1,6 +1,9 @@
 //! A file with the focal lengths and the middle of a camera, as depth needs them.
 
-use crate::model::{Pinhole, Size};
+use super::depth_format::SaidOfDepth;
+use crate::config::{self, DepthCamera};
+use crate::depth;
+use crate::model::{CameraModel, Pinhole, Size};
 use nalgebra::{Point2, Vector2};
 use serde::Deserialize;
 use std::io::Read;
@@ -10,13 +13,15 @@ use std::path::{Path, PathBuf};
 const LONGEST: u64 = 1 << 16;
 
 /// A camera without distortion, as a file has it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CameraFile {
     /// Size of the pictures that it is for; `None` where the file does not say.
     pub size: Option<Size>,
     pub pinhole: Pinhole,
     /// Metres for each count of a depth image; `None` where the file does not say.
     pub unit_m: Option<f64>,
+    /// The depth camera, where its images are not registered with the pictures.
+    pub depth: Option<DepthCamera>,
 }
 
 /// Why a file is no camera.
@@ -45,6 +50,7 @@ struct Written {
     cy: Option<f64>,
     intrinsic_matrix: Option<[f64; 9]>,
     depth_unit_m: Option<f64>,
+    depth: Option<DepthCamera>,
 }
 
 impl CameraFile {
@@ -66,8 +72,27 @@ impl CameraFile {
         })
     }
 
-    fn parse(text: &str) -> Result<Self, String> {
-        let written: Written = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    /// What the file says of the depth beside pictures of this size, whose unit is `unit_m` unless
+    /// the file says another, m.
+    pub(super) fn said(&self, picture: Size, unit_m: f64) -> SaidOfDepth {
+        let own = config::Depth {
+            own_camera: self.depth.iter().cloned().collect(),
+            ..config::Depth::default()
+        };
+        SaidOfDepth {
+            pinhole: Some(self.pinhole),
+            unit_m: Some(self.unit_m.unwrap_or(unit_m)),
+            is_in_metres: false,
+            rig: depth::rig(&own, CameraModel::new(picture, self.pinhole)),
+        }
+    }
+
+    /// Reads the text of a file.
+    ///
+    /// # Errors
+    /// It is no camera: why, in one line.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let written: Written = serde_json::from_str(text).map_err(|e| one_line(&e.to_string()))?;
         let pinhole = written.pinhole().ok_or("fx, fy, cx or cy is missing")?;
         if !pinhole.is_valid() {
             return Err("fx and fy must be numbers above 0".to_owned());
@@ -76,13 +101,22 @@ impl CameraFile {
         if unit_m.is_some_and(|unit_m| !(unit_m > 0.0 && unit_m <= 1.0)) {
             return Err("depth_unit_m must be above 0, at most 1".to_owned());
         }
+        if let Some(depth) = &written.depth {
+            depth.check().map_err(|what| format!("depth: {what}"))?;
+        }
         let sides = written.width.zip(written.height);
         Ok(Self {
             size: sides.map(|(width, height)| Size::new(width, height)),
             pinhole,
             unit_m,
+            depth: written.depth,
         })
     }
+}
+
+/// A message that may quote what stands in the file.
+pub(super) fn one_line(message: &str) -> String {
+    message.replace(['\n', '\r'], " ")
 }
 
 impl Written {
@@ -119,6 +153,20 @@ mod tests {
         assert_eq!(numbers.pinhole, matrix.pinhole);
         assert_eq!(numbers.size, Some(Size::new(640, 480)));
         assert_eq!((numbers.unit_m, matrix.unit_m), (Some(0.0002), None));
+    }
+
+    #[test]
+    fn a_depth_camera_of_its_own_is_read_with_its_place() {
+        let text = r#"{"fx": 900, "fy": 900, "cx": 640, "cy": 360, "depth_unit_m": 0.001,
+            "depth": {"width": 848, "height": 480, "fx": 420, "fy": 420, "cx": 424, "cy": 240,
+                "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "translation_m": [0.015, 0, 0]}}"#;
+        let depth = CameraFile::parse(text).expect("a camera").depth;
+        let depth = depth.expect("a depth camera");
+        assert_eq!((depth.width, depth.fx_px), (848, 420.0));
+        assert_eq!(depth.translation_m, [0.015, 0.0, 0.0]);
+        let mirrored = text.replace("[1, 0, 0, 0, 1", "[-1, 0, 0, 0, 1");
+        let said = CameraFile::parse(&mirrored).expect_err("a mirror");
+        assert!(said.contains("depth: rotation"), "{said}");
     }
 
     #[test]

@@ -66,6 +66,11 @@ impl Wish {
         }
     }
 
+    /// Whether depth is wanted, and no pictures.
+    pub(super) fn is_of_depth(&self) -> bool {
+        self.format.is_some_and(PixelFormat::is_depth)
+    }
+
     /// Whether this is what was asked for. A rate that is not told is none that was substituted.
     pub(super) fn is_met_by(&self, granted: &Granted) -> bool {
         self.format.is_none_or(|f| f == granted.format)

@@ -70,7 +70,8 @@ impl Decoder {
                 .iter_mut()
                 .zip(raw.bytes.chunks_exact(2))
                 .for_each(|(y, pair)| *y = pair[0]),
-            PixelFormat::Uyvy => pixels
+            // The upper bytes: a picture of far and near.
+            PixelFormat::Uyvy | PixelFormat::Z16 | PixelFormat::Y16 => pixels
                 .iter_mut()
                 .zip(raw.bytes.chunks_exact(2))
                 .for_each(|(y, pair)| *y = pair[1]),
@@ -232,6 +233,7 @@ fn colour_of(raw: &RawFrame) -> impl Fn(u32, u32) -> [u8; 3] {
     move |u, v| {
         let i = v as usize * width + u as usize;
         match format {
+            PixelFormat::Z16 | PixelFormat::Y16 => [bytes[2 * i + 1]; 3],
             PixelFormat::Rgb24 => [bytes[3 * i], bytes[3 * i + 1], bytes[3 * i + 2]],
             // A pair of pixels shares U and V. An odd width does not occur: source and ffmpeg see
             // to it.

@@ -2,8 +2,8 @@
 
 use super::error::SourceError;
 use crate::config;
-use crate::depth;
-use crate::model::{DepthFormat, DepthImage, Pinhole, Size};
+use crate::depth::{self, Registration};
+use crate::model::{CameraModel, DepthFormat, DepthImage, DepthRig, Pinhole, Size};
 use std::path::Path;
 
 /// By how much the proportions of depth image and picture may differ.
@@ -12,28 +12,43 @@ const SAME_VIEW: f64 = 0.01;
 /// What a film says of its depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SaidOfDepth {
+    /// The colour camera.
     pub pinhole: Option<Pinhole>,
     pub unit_m: Option<f64>,
+    /// The unit is part of the format: the user cannot know better.
+    pub is_in_metres: bool,
+    /// Both cameras, where the depth is not registered with the pictures.
+    pub rig: Option<DepthRig>,
+}
+
+/// How the depth images of a film are used.
+#[derive(Clone, Debug)]
+pub(super) struct KnownDepth {
+    pub format: DepthFormat,
+    picture: Size,
+    registration: Option<Registration>,
 }
 
 impl SaidOfDepth {
-    /// The format of the depth in the film `path`.
+    /// How the depth beside pictures of the size `picture` in the film `path` is used.
     ///
     /// # Errors
     /// Camera or unit is known to nobody.
-    pub fn format(
+    pub fn known(
         &self,
         path: &Path,
         settings: &config::Depth,
-    ) -> Result<DepthFormat, SourceError> {
-        let Some(pinhole) = depth::pinhole(settings).or(self.pinhole) else {
+        picture: Size,
+    ) -> Result<KnownDepth, SourceError> {
+        let of_rig = self.rig.map(|rig| rig.colour.for_size(picture).pinhole);
+        let Some(pinhole) = depth::pinhole(settings).or(self.pinhole).or(of_rig) else {
             return Err(SourceError::bad_format(
                 path,
                 "nothing says what camera its depth belongs to; give --depth-camera FILE, or --no-depth \
                  for the colours alone",
             ));
         };
-        let given = Some(settings.unit_m).filter(|unit_m| *unit_m > 0.0);
+        let given = Some(settings.unit_m).filter(|unit_m| *unit_m > 0.0 && !self.is_in_metres);
         let Some(unit_m) = given.or(self.unit_m) else {
             return Err(SourceError::bad_format(
                 path,
@@ -41,22 +56,73 @@ impl SaidOfDepth {
                  0.001), or --no-depth for the colours alone",
             ));
         };
-        Ok(DepthFormat { pinhole, unit_m })
+        let mut registration = None;
+        if let Some(rig) = self.rig(settings, pinhole, picture) {
+            let usable = Registration::new(&rig, picture, unit_m).ok_or_else(|| {
+                let what = "the cameras of its depth and of its pictures make no sense; give \
+                            --depth-camera FILE, or --no-depth for the colours alone";
+                SourceError::bad_format(path, what)
+            });
+            registration = Some(usable?);
+        }
+        Ok(KnownDepth {
+            format: DepthFormat { pinhole, unit_m },
+            picture,
+            registration,
+        })
+    }
+
+    /// Both cameras, where the depth is not registered; the user's go before those of the film.
+    fn rig(&self, settings: &config::Depth, pinhole: Pinhole, picture: Size) -> Option<DepthRig> {
+        let given = CameraModel::new(picture, pinhole);
+        if let Some(rig) = depth::rig(settings, given) {
+            return Some(rig);
+        }
+        let rig = self.rig?;
+        let colour = match depth::pinhole(settings) {
+            Some(_) => given,
+            None => rig.colour,
+        };
+        Some(DepthRig { colour, ..rig })
     }
 }
 
-/// Checks that a depth image shows what the picture shows.
+impl KnownDepth {
+    /// Checks that depth images of this size show what the pictures show.
+    ///
+    /// # Errors
+    /// They do not: why they cannot be used.
+    pub fn check_size(&self, size: Size) -> Result<(), String> {
+        match &self.registration {
+            Some(registration) => registration.check_size(size),
+            None => check_view(size, self.picture),
+        }
+    }
+
+    /// A depth image of the film as it is used: registered with the pictures.
+    ///
+    /// # Errors
+    /// It shows something else than the pictures: why it cannot be used.
+    pub fn usable(&self, image: DepthImage) -> Result<DepthImage, String> {
+        match &self.registration {
+            Some(registration) => registration.registered(&image),
+            None => check_view(image.size, self.picture).map(|()| image),
+        }
+    }
+}
+
+/// Checks that a depth image of this size shows what the picture shows.
 ///
 /// # Errors
 /// It has other proportions: why it cannot be used.
-pub(super) fn check_view(depth: &DepthImage, picture: Size) -> Result<(), String> {
-    let across = f64::from(depth.size.width) / f64::from(picture.width);
-    let down = f64::from(depth.size.height) / f64::from(picture.height);
+fn check_view(depth: Size, picture: Size) -> Result<(), String> {
+    let across = f64::from(depth.width) / f64::from(picture.width);
+    let down = f64::from(depth.height) / f64::from(picture.height);
     if (across / down - 1.0).abs() <= SAME_VIEW {
         return Ok(());
     }
     Err(format!(
-        "the depth image is {}, the picture {picture}; it must be registered with the picture",
-        depth.size
+        "the depth image is {depth}, the picture {picture}; it must be registered with the picture, or \
+         --depth-camera must say where its camera is"
     ))
 }

@@ -7,7 +7,7 @@ const MISSING_SHARE: f64 = 0.1;
 
 /// Frames with and without depth.
 #[derive(Clone, Debug, Default)]
-pub(super) struct DepthTally {
+pub struct DepthTally {
     frames: u64,
     with_depth: u64,
     first_s: Option<f64>,

@@ -25,6 +25,8 @@ pub struct Device {
     pub films: bool,
     /// What it says it can do, of what we can read.
     pub modes: Vec<Mode>,
+    /// What it says it can do as a depth camera; with nothing else in `modes` it is none that films.
+    pub depth_modes: Vec<Mode>,
     /// What would be filmed, e.g. `MJPG 1280x720 @ 30`, and why.
     pub chosen: Option<(String, String)>,
     /// Why it cannot be opened, and what to do.
@@ -53,12 +55,18 @@ fn device(node: Node, config: &config::Camera, places: &Places) -> Device {
         .map_or_else(|| "nothing is known of it".to_owned(), |i| i.port.clone());
     match prospect(&path, config) {
         Ok(p) => {
-            let kind = if p.films { "" } else { ", does not film" };
+            let only_depth = p.modes.is_empty() && !p.depth_modes.is_empty();
+            let kind = match p.films {
+                true if only_depth => ", depth",
+                true => "",
+                false => ", does not film",
+            };
             Device {
                 name: p.card,
                 description: format!("{} at {}{kind}", p.driver, p.bus),
-                films: p.films,
+                films: p.films && !only_depth,
                 modes: p.modes,
+                depth_modes: p.depth_modes,
                 chosen: p.chosen.map(|(granted, why)| (granted.to_string(), why)),
                 closed: None,
                 path,
@@ -76,6 +84,7 @@ fn device(node: Node, config: &config::Camera, places: &Places) -> Device {
             // Only a program that may open it can know.
             films: true,
             modes: Vec::new(),
+            depth_modes: Vec::new(),
             chosen: None,
             closed: Some(e.to_string()),
             path,

@@ -90,6 +90,12 @@ pub trait Source: Send {
         None
     }
 
+    /// The depth camera beside this camera, once: its frames have depth images and no pictures. To be
+    /// read on a thread of its own.
+    fn take_depth_camera(&mut self) -> Option<Box<dyn Source>> {
+        None
+    }
+
     fn health(&self) -> Health {
         Health::default()
     }

@@ -1,15 +1,16 @@
 //! A recording as a source: its own frames, numbers and times.
 
-use super::depth_format::{SaidOfDepth, check_view};
+use super::depth_format::{KnownDepth, SaidOfDepth};
 use super::depth_tally::DepthTally;
 use super::error::SourceError;
 use super::images::picture;
 use super::interface::{Source, SourceInfo};
 use crate::config;
-use crate::model::{DepthFormat, FormatNote, Origin, PixelFormat, RawFrame, Size, seconds};
+use crate::model::{DepthImage, FormatNote, Origin, PixelFormat, RawFrame, Size, seconds};
 use crate::recording::{Encoding, Picture, Reader, RecordingError};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// So many frames are looked at for the camera of their depth.
 const FRAMES_FOR_CAMERA: usize = 8;
@@ -28,7 +29,7 @@ pub(super) struct Recording {
     unreadable: u64,
     ended: bool,
     /// `None` where it has no depth, or none is wanted.
-    depth: Option<DepthFormat>,
+    depth: Option<KnownDepth>,
     tally: DepthTally,
 }
 
@@ -93,7 +94,9 @@ impl Recording {
     /// is not known.
     fn frames_at_first(&self) -> usize {
         let waits = self.size.is_some_and(|size| {
-            self.reader.has_depth() && self.reader.depth_camera(size).is_none()
+            let is_known = self.reader.depth_camera(size).is_some()
+                && (self.reader.depth_misfit().is_none() || self.reader.depth_rig().is_some());
+            self.reader.has_depth() && !is_known
         });
         if waits { FRAMES_FOR_CAMERA } else { 2 }
     }
@@ -102,23 +105,42 @@ impl Recording {
         let Some(size) = self.size.filter(|_| self.reader.has_depth()) else {
             return Ok(());
         };
-        if let Some(frames) = self.reader.depth_misfit() {
-            let what = format!(
-                "its depth is not registered with its pictures (frames {frames}); record the depth that \
-                 is, e.g. aligned_depth_to_color, or give --no-depth"
-            );
-            return Err(SourceError::bad_format(&self.path, what));
-        }
-        let first = self.pending.iter().find_map(|frame| frame.depth.as_ref());
-        if let Some(image) = first {
-            check_view(image, size).map_err(|what| SourceError::bad_format(&self.path, what))?;
-        }
         let said = SaidOfDepth {
             pinhole: self.reader.depth_camera(size),
             unit_m: self.reader.depth_unit_m(),
+            is_in_metres: self.reader.is_depth_in_metres(),
+            rig: self.reader.depth_rig(),
         };
-        self.depth = Some(said.format(&self.path, settings)?);
+        let misfit = self.reader.depth_misfit();
+        let is_placed = said.rig.is_some() || !settings.own_camera.is_empty();
+        if let Some(why) = misfit.filter(|_| !is_placed) {
+            let what = format!(
+                "its depth is not registered with its pictures ({why}), and nothing says where its camera \
+                 is; record the depth that is, e.g. aligned_depth_to_color, say it with --depth-camera \
+                 FILE, or give --no-depth"
+            );
+            return Err(SourceError::bad_format(&self.path, what));
+        }
+        let known = said.known(&self.path, settings, size)?;
+        let first = self.pending.iter().find_map(|frame| frame.depth.as_ref());
+        if let Some(image) = first {
+            let usable = known.usable((**image).clone());
+            usable.map_err(|what| SourceError::bad_format(&self.path, what))?;
+        }
+        self.depth = Some(known);
         Ok(())
+    }
+
+    /// A depth image of the file as it is used; one that cannot be is counted.
+    fn usable(&mut self, image: Arc<DepthImage>) -> Option<Arc<DepthImage>> {
+        let known = self.depth.as_ref()?;
+        match known.usable(Arc::unwrap_or_clone(image)) {
+            Ok(image) => Some(Arc::new(image)),
+            Err(why) => {
+                self.tally.unreadable(why);
+                None
+            }
+        }
     }
 
     /// The next frame whose time is later than the last one's.
@@ -184,8 +206,12 @@ impl Source for Recording {
         if self.ended {
             return Ok(None);
         }
-        let frame = self.pending.pop_front().or_else(|| self.read_frame());
+        let mut frame = self.pending.pop_front().or_else(|| self.read_frame());
         self.ended = frame.is_none();
+        if let Some(frame) = &mut frame {
+            let depth = frame.depth.take();
+            frame.depth = depth.and_then(|depth| self.usable(depth));
+        }
         if let (Some(frame), true) = (&frame, self.depth.is_some()) {
             self.tally.frame(frame.sensor_time_s, frame.depth.is_some());
         }
@@ -217,7 +243,7 @@ impl Source for Recording {
                 .filter(|hz: &f64| *hz > 0.0),
             frames_total: self.reader.pictures_total(),
             live: false,
-            depth: self.depth,
+            depth: self.depth.as_ref().map(|depth| depth.format),
         }
     }
 

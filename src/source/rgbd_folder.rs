@@ -3,15 +3,13 @@
 //! clocks of their own; images belong together by their times.
 
 use super::camera_file::CameraFile;
-use super::depth_format::{SaidOfDepth, check_view};
+use super::depth_format::{KnownDepth, SaidOfDepth};
 use super::depth_tally::DepthTally;
 use super::error::SourceError;
 use super::images::picture;
 use super::interface::{Source, SourceInfo};
 use crate::config;
-use crate::model::{
-    DEPTH_APART_S, DepthFormat, DepthImage, FormatNote, RawFrame, Size, nanoseconds, seconds,
-};
+use crate::model::{DEPTH_APART_S, DepthImage, FormatNote, RawFrame, Size, nanoseconds, seconds};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -37,7 +35,7 @@ pub(super) struct RgbdFolder {
     frames: Vec<Listed>,
     /// The depth image that belongs to each of the frames.
     depths: Vec<Option<PathBuf>>,
-    format: Option<DepthFormat>,
+    known: Option<KnownDepth>,
     next: usize,
     size: Size,
     tally: DepthTally,
@@ -67,7 +65,7 @@ impl RgbdFolder {
             folder: folder.to_owned(),
             depths: vec![None; frames.len()],
             frames,
-            format: None,
+            known: None,
             next: 0,
             size,
             tally: DepthTally::default(),
@@ -99,8 +97,13 @@ impl RgbdFolder {
             ));
         };
         let image = read_depth(first).map_err(|what| SourceError::bad_format(first, what))?;
-        check_view(&image, self.size).map_err(|what| SourceError::bad_format(first, what))?;
-        self.format = Some(self.said(settings)?.format(&self.folder, settings)?);
+        let known = self
+            .said(settings)?
+            .known(&self.folder, settings, self.size)?;
+        known
+            .usable(image)
+            .map_err(|what| SourceError::bad_format(first, what))?;
+        self.known = Some(known);
         Ok(())
     }
 
@@ -116,8 +119,8 @@ impl RgbdFolder {
                 ));
             }
             return Ok(SaidOfDepth {
-                pinhole: None,
                 unit_m: Some(UNIT_M),
+                ..SaidOfDepth::default()
             });
         }
         let camera = CameraFile::read(&file)
@@ -126,19 +129,13 @@ impl RgbdFolder {
             let what = format!("it is for pictures of {size}, these are {}", self.size);
             return Err(SourceError::bad_format(&file, what));
         }
-        Ok(SaidOfDepth {
-            pinhole: Some(camera.pinhole),
-            unit_m: Some(camera.unit_m.unwrap_or(UNIT_M)),
-        })
+        Ok(camera.said(self.size, UNIT_M))
     }
 
     /// The depth image of frame `k`, if there is one that can be used.
     fn depth(&mut self, k: usize) -> Option<Arc<DepthImage>> {
-        let file = self.depths[k].clone()?;
-        let read = read_depth(&file).and_then(|image| {
-            check_view(&image, self.size)?;
-            Ok(image)
-        });
+        let (file, known) = (self.depths[k].clone()?, self.known.as_ref()?);
+        let read = read_depth(&file).and_then(|image| known.usable(image));
         match read {
             Ok(image) => Some(Arc::new(image)),
             Err(why) => {
@@ -163,7 +160,7 @@ impl Source for RgbdFolder {
             return Err(SourceError::bad_format(&file, what));
         }
         let depth = self.depth(k);
-        if self.format.is_some() {
+        if self.known.is_some() {
             self.tally.frame(time_s, depth.is_some());
         }
         self.next += 1;
@@ -178,7 +175,7 @@ impl Source for RgbdFolder {
     }
 
     fn describe(&self) -> SourceInfo {
-        let beside = match self.format {
+        let beside = match self.known {
             Some(_) => " and depth",
             None => "",
         };
@@ -193,7 +190,7 @@ impl Source for RgbdFolder {
             nominal_rate_hz: None,
             frames_total: Some(self.frames.len() as u64),
             live: false,
-            depth: self.format,
+            depth: self.known.as_ref().map(|known| known.format),
         }
     }
 

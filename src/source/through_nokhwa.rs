@@ -295,7 +295,7 @@ fn frame_format(format: PixelFormat) -> Option<FrameFormat> {
         PixelFormat::Yuyv => Some(FrameFormat::YUYV),
         PixelFormat::Nv12 => Some(FrameFormat::NV12),
         PixelFormat::Rgb24 => Some(FrameFormat::RAWRGB),
-        PixelFormat::Uyvy | PixelFormat::Grey => None,
+        PixelFormat::Uyvy | PixelFormat::Grey | PixelFormat::Z16 | PixelFormat::Y16 => None,
     }
 }
 

@@ -1,68 +1,24 @@
-//! Video files, through ffmpeg as a child process.
-//!
-//! ffmpeg writes two things: one line of text a frame with its time and length (`framecrc`), and
-//! the frame's bytes. Each is flushed frame by frame and the line goes first, so that reading a
-//! line and then that many bytes, in turns, can never wait for something that ffmpeg has not
-//! written: no thread and no polling is needed.
-//!
-//! MJPEG is only taken out of its container, every other codec is decoded to YUYV. Times are those
-//! in the file.
+//! Video files, through ffmpeg as a child process. MJPEG is only taken out of its container, every
+//! other codec is decoded to YUYV. Times are those in the file.
 
 use super::error::SourceError;
 use super::interface::{Source, SourceInfo};
-use super::probe::{Probe, file_url, probe, ratio, spawn_error};
-use crate::ffmpeg::{Ffmpeg, plain};
-use crate::model::{FormatNote, Origin, PixelFormat, RawFrame, Size, nanoseconds, seconds};
+use super::probe::{Probe, probe};
+use super::video_pipe::{VideoPipe, VideoPipeFrame};
+use crate::model::{FormatNote, Origin, PixelFormat, RawFrame, Size};
 use std::collections::VecDeque;
-use std::io::{BufRead, BufReader, PipeReader, Read};
 use std::path::{Path, PathBuf};
-use std::process::{ChildStdout, Command, Stdio};
 
-/// No frame of a size that we can work with is longer; what is comes from a broken file.
-const MAX_FRAME_BYTES: usize = 1 << 30;
-
-/// The line goes to the pipe that is the child's descriptor 0, before the frame goes to its
-/// standard output.
-const OUTPUTS: &str = "[f=framecrc:flush_packets=1]pipe:0|[f=rawvideo:flush_packets=1]pipe:1";
-
-/// What it means that the child's pipes cannot be made.
-fn no_pipe(ffmpeg: &str, path: &Path, e: &std::io::Error) -> SourceError {
-    // Never the kind of a program that is not there.
-    spawn_error(ffmpeg, path, &std::io::Error::other(e.to_string()))
-}
-
-/// Writes the frames of `path` in `format`, and a line for each.
-fn reader(path: &Path, ffmpeg: &str, format: PixelFormat) -> Command {
-    let mut command = Command::new(ffmpeg);
-    command
-        .args(["-nostdin", "-hide_banner", "-v", "error"])
-        .args(["-protocol_whitelist", "file"])
-        .args(["-fflags", "+discardcorrupt", "-copyts", "-i"])
-        .arg(file_url(path))
-        .args(["-map", "0:V:0"]);
-    match format {
-        PixelFormat::Mjpeg => command.args(["-c:v", "copy"]),
-        // Two pixels share their colour in YUYV: an odd column at the right is cut off. Without
-        // `-enc_time_base` and `-vsync` the times would be rounded to a nominal rate.
-        _ => command
-            .args(["-vf", "format=yuyv422,crop=trunc(iw/2)*2:ih:0:0"])
-            .args(["-c:v", "rawvideo", "-pix_fmt", "yuyv422"])
-            .args(["-vsync", "passthrough", "-enc_time_base", "-1"]),
-    };
-    command.args(["-f", "tee", OUTPUTS]);
-    command
-}
+/// The first stream of moving pictures.
+const FIRST: &str = "0:V:0";
 
 /// A video file that is being read.
 pub(super) struct Video {
     path: PathBuf,
     probe: Probe,
-    lines: BufReader<PipeReader>,
-    data: ChildStdout,
-    child: Ffmpeg,
+    pipe: VideoPipe,
     size: Size,
     format: PixelFormat,
-    tick_s: f64,
     /// The first two frames are read when the file is opened: only then it is known that there are
     /// any, and motion.
     pending: VecDeque<RawFrame>,
@@ -87,24 +43,13 @@ impl Video {
         } else {
             PixelFormat::Yuyv
         };
-        let (lines, lines_end) = std::io::pipe().map_err(|e| no_pipe(ffmpeg, path, &e))?;
-        let mut command = reader(path, ffmpeg, format);
-        command.stdin(lines_end).stdout(Stdio::piped());
-        let mut child = Ffmpeg::start(&mut command).map_err(|e| spawn_error(ffmpeg, path, &e))?;
-        // The command still holds the pipe's other end, and with it the end of the stream.
-        drop(command);
-        let Some(data) = child.output() else {
-            return Err(no_pipe(ffmpeg, path, &std::io::Error::other("no pipe")));
-        };
+        let pipe = VideoPipe::start(path, ffmpeg, FIRST, format)?;
         let mut video = Self {
             path: path.to_owned(),
             probe,
-            lines: BufReader::new(lines),
-            data,
-            child,
+            pipe,
             size: Size::new(0, 0),
             format,
-            tick_s: 0.0,
             pending: VecDeque::new(),
             frames: 0,
             out_of_order: 0,
@@ -126,7 +71,7 @@ impl Video {
 
     /// Why there is no frame at all.
     fn unreadable(&mut self) -> SourceError {
-        match self.complaint() {
+        match self.pipe.complaint() {
             None => SourceError::Empty {
                 input: self.path.display().to_string(),
                 what: "the video has no frame; film again, or name another file",
@@ -140,19 +85,15 @@ impl Video {
 
     /// The next frame whose time is later than the last one's, `None` at the end.
     fn read_frame(&mut self) -> Option<RawFrame> {
-        while let Some((ticks, length)) = self.read_line() {
-            let mut bytes = Vec::with_capacity(length);
-            let read = self
-                .data
-                .by_ref()
-                .take(length as u64)
-                .read_to_end(&mut bytes);
-            if read.is_err() || bytes.len() < length {
-                return None;
-            }
+        while let Some(VideoPipeFrame {
+            time_s: sensor_time_s,
+            size,
+            bytes,
+        }) = self.pipe.next_frame()
+        {
+            self.size = size;
             let sequence = self.frames;
             self.frames += 1;
-            let sensor_time_s = seconds(nanoseconds(ticks as f64 * self.tick_s));
             if sensor_time_s <= self.last_time_s {
                 self.out_of_order += 1;
                 continue;
@@ -175,43 +116,9 @@ impl Video {
         None
     }
 
-    /// Time in ticks and length of the next frame; the head before the first one is taken in on the
-    /// way.
-    fn read_line(&mut self) -> Option<(i64, usize)> {
-        let mut line = String::new();
-        loop {
-            line.clear();
-            if self.lines.read_line(&mut line).ok()? == 0 {
-                return None;
-            }
-            if let Some(tick) = line.strip_prefix("#tb 0:") {
-                self.tick_s = ratio(tick)?;
-            } else if let Some(size) = line.strip_prefix("#dimensions 0:") {
-                let (width, height) = size.trim().split_once('x')?;
-                self.size = Size::new(width.parse().ok()?, height.parse().ok()?);
-            } else if !line.starts_with('#') {
-                // stream, decoding time, presentation time, duration, length, checksum
-                let mut fields = line.split(',').skip(1).map(str::trim);
-                let decoded: i64 = fields.next()?.parse().ok()?;
-                let shown: i64 = fields.next()?.parse().ok()?;
-                let length: usize = fields.nth(1)?.parse().ok()?;
-                let known = self.tick_s > 0.0 && self.size.area() > 0 && length <= MAX_FRAME_BYTES;
-                // AVI has no presentation times; there the two are the same.
-                return known.then_some((if shown == i64::MIN { decoded } else { shown }, length));
-            }
-        }
-    }
-
-    /// The first thing that ffmpeg complained about. Ends the child if it runs.
-    fn complaint(&mut self) -> Option<String> {
-        self.child.kill();
-        let said = self.child.complaints();
-        said.first().map(|line| plain(line).to_owned())
-    }
-
     /// Works out what is to be said when no more frames come.
     fn finish(&mut self) {
-        let complaint = self.complaint();
+        let complaint = self.pipe.complaint();
         let name = self.path.display();
         let read_s = self.last_time_s - self.first_time_s + self.interval_s;
         let frames = self.frames;

@@ -1,4 +1,5 @@
 //! Recordings as programs of ROS make them: pictures, depth that is registered with them, and cameras.
+#![allow(dead_code)] // not every test file needs all of it
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -23,22 +24,33 @@ pub struct Faults {
 }
 
 /// Fields of a message of ROS 1, or of ROS 2 (CDR, little-endian).
-struct Message {
+pub struct Message {
     bytes: Vec<u8>,
     is_ros2: bool,
 }
 
 impl Message {
-    fn new(is_ros2: bool, time_ns: u64, frame: &str) -> Self {
+    /// A message with a head.
+    pub fn new(is_ros2: bool, time_ns: u64, frame: &str) -> Self {
+        let mut message = Self::bare(is_ros2);
+        message.head(time_ns, frame);
+        message
+    }
+
+    /// A message without a head.
+    pub fn bare(is_ros2: bool) -> Self {
         let bytes = Vec::new();
-        let mut message = Self { bytes, is_ros2 };
+        Self { bytes, is_ros2 }
+    }
+
+    fn head(&mut self, time_ns: u64, frame: &str) {
+        let (message, is_ros2) = (self, self.is_ros2);
         if !is_ros2 {
             message.u32(0);
         }
         message.u32((time_ns / 1_000_000_000) as u32);
         message.u32((time_ns % 1_000_000_000) as u32);
         message.text(frame);
-        message
     }
 
     fn align(&mut self, to: usize) {
@@ -64,28 +76,65 @@ impl Message {
         self.bytes.extend(end);
     }
 
-    fn image(mut self, encoding: &str, pixel_bytes: u32, data: &[u8]) -> Vec<u8> {
-        self.u32(HEIGHT);
-        self.u32(WIDTH);
+    fn image(self, encoding: &str, pixel_bytes: u32, data: &[u8]) -> Vec<u8> {
+        self.image_of([WIDTH, HEIGHT], encoding, pixel_bytes, data)
+    }
+
+    /// An image of this width and height.
+    pub fn image_of(
+        mut self,
+        size: [u32; 2],
+        encoding: &str,
+        pixel_bytes: u32,
+        data: &[u8],
+    ) -> Vec<u8> {
+        self.u32(size[1]);
+        self.u32(size[0]);
         self.text(encoding);
         self.bytes.push(0);
-        self.u32(pixel_bytes * WIDTH);
+        self.u32(pixel_bytes * size[0]);
         self.u32(data.len() as u32);
         self.bytes.extend(data);
         self.done()
     }
 
-    fn camera(mut self) -> Vec<u8> {
-        self.u32(HEIGHT);
-        self.u32(WIDTH);
+    fn camera(self) -> Vec<u8> {
+        self.camera_of([WIDTH, HEIGHT], FOCAL_PX)
+    }
+
+    /// A camera without distortion that looks at the middle of its images.
+    pub fn camera_of(mut self, size: [u32; 2], focal_px: f64) -> Vec<u8> {
+        self.u32(size[1]);
+        self.u32(size[0]);
         self.text("plumb_bob");
         self.u32(5);
         (0..5).for_each(|_| self.f64(0.0));
-        let (cx, cy) = (f64::from(WIDTH) / 2.0 - 0.5, f64::from(HEIGHT) / 2.0 - 0.5);
-        for k in [FOCAL_PX, 0.0, cx, 0.0, FOCAL_PX, cy, 0.0, 0.0, 1.0] {
+        let [cx, cy] = size.map(|side| f64::from(side) / 2.0 - 0.5);
+        for k in [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0] {
             self.f64(k);
         }
         self.done()
+    }
+
+    /// One shift without a turn.
+    pub fn transform(mut self, shift_m: [f64; 3]) -> Vec<u8> {
+        self.shift(shift_m);
+        self.done()
+    }
+
+    /// Where a frame of reference stands in another.
+    pub fn frame_transform(mut self, parent: &str, child: &str, shift_m: [f64; 3]) -> Vec<u8> {
+        self.u32(1);
+        self.head(5, parent);
+        self.text(child);
+        self.shift(shift_m);
+        self.done()
+    }
+
+    fn shift(&mut self, shift_m: [f64; 3]) {
+        for x in shift_m.into_iter().chain([0.0, 0.0, 0.0, 1.0]) {
+            self.f64(x);
+        }
     }
 
     fn done(self) -> Vec<u8> {

@@ -75,7 +75,16 @@ struct Opened {
 
 impl Camera {
     pub(super) fn open(path: &Path, config: &config::Camera) -> Result<Self, SourceError> {
-        let asked = Wish::of(config);
+        Self::open_as(path, config, &Wish::of(config))
+    }
+
+    /// Opens it for what is asked for; of depth whatever is granted is taken.
+    pub(super) fn open_as(
+        path: &Path,
+        config: &config::Camera,
+        asked: &Wish,
+    ) -> Result<Self, SourceError> {
+        let asked = *asked;
         let Opened {
             caps,
             negotiated,
@@ -86,7 +95,8 @@ impl Camera {
             stride,
             modes,
         } = negotiated;
-        if !asked.is_met_by(&granted) && !config.accept_format {
+        let takes_any = config.accept_format || asked.is_of_depth();
+        if !asked.is_met_by(&granted) && !takes_any {
             return Err(SourceError::bad_format(
                 path,
                 refusal(&asked, &granted, &modes),
@@ -332,6 +342,10 @@ fn open(path: &Path, wish: &Wish) -> Result<Opened, SourceError> {
         return Err(SourceError::bad_format(path, what.to_owned()));
     }
     let negotiated = negotiate(&device, wish, is_usb(&caps)).map_err(|e| match e {
+        Ok(name) if wish.is_of_depth() => SourceError::bad_format(
+            path,
+            format!("it delivers {name}, which is no depth; `arborcam devices` lists what does"),
+        ),
         Ok(name) => SourceError::bad_format(
             path,
             format!("it delivers {name}, which is none of the formats that can be read"),
@@ -404,6 +418,8 @@ pub(super) struct Prospect {
     pub bus: String,
     pub films: bool,
     pub modes: Vec<Mode>,
+    /// What it can do as a depth camera.
+    pub depth_modes: Vec<Mode>,
     pub chosen: Option<(Granted, String)>,
 }
 
@@ -412,11 +428,15 @@ pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect,
     let (device, caps) = open_device(path)?;
     let films = films(&caps);
     let wish = Wish::of(config);
-    let modes = if films {
-        offers::modes(&device, &wish)
-    } else {
-        Vec::new()
+    let of_depth = Wish {
+        format: Some(PixelFormat::DEPTH[0]),
+        ..wish
     };
+    let (mut modes, mut depth_modes) = (Vec::new(), Vec::new());
+    if films {
+        modes = offers::modes(&device, &wish);
+        depth_modes = offers::modes(&device, &of_depth);
+    }
     let chosen = choose(&modes, &wish, is_usb(&caps));
     Ok(Prospect {
         card: caps.card.trim().to_owned(),
@@ -424,6 +444,7 @@ pub(super) fn prospect(path: &Path, config: &config::Camera) -> Result<Prospect,
         bus: caps.bus.trim().to_owned(),
         films,
         modes,
+        depth_modes,
         chosen,
     })
 }
@@ -459,7 +480,7 @@ fn without_padding(used: &[u8], format: PixelFormat, size: Size, stride: usize) 
 fn line_bytes(format: PixelFormat, size: Size) -> usize {
     let bytes_per_pixel = match format {
         PixelFormat::Mjpeg => 0,
-        PixelFormat::Yuyv | PixelFormat::Uyvy => 2,
+        PixelFormat::Yuyv | PixelFormat::Uyvy | PixelFormat::Z16 | PixelFormat::Y16 => 2,
         PixelFormat::Grey | PixelFormat::Nv12 => 1,
         PixelFormat::Rgb24 => 3,
     };

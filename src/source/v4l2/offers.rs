@@ -35,14 +35,15 @@ fn hz(interval: Fraction) -> Option<f64> {
     (hz.is_finite() && hz > 0.0).then_some(hz)
 }
 
-/// All that the device lists and we can read. Of a range the size or rate nearest to `wish` stands
+/// All that the device lists and we can read: depth or pictures, whichever is wished for. Of a range the size or rate nearest to `wish` stands
 /// for all, beside its ends.
 pub(super) fn modes(device: &Device, wish: &Wish) -> Vec<Mode> {
     let mut modes = Vec::new();
     let listed = device.enum_formats().unwrap_or_default();
     let formats = listed
         .iter()
-        .filter_map(|f| Some((f.fourcc, PixelFormat::from_fourcc(f.fourcc.str().ok()?)?)));
+        .filter_map(|f| Some((f.fourcc, PixelFormat::from_fourcc(f.fourcc.str().ok()?)?)))
+        .filter(|(_, format)| format.is_depth() == wish.is_of_depth());
     for (code, format) in formats {
         for size in sizes(device, code, wish.size) {
             let rates_hz = rates(device, code, size, wish.rate_hz);
@@ -127,7 +128,7 @@ pub(super) fn negotiate(
         Some((best, _)) => ask(device, best.format, best.size),
         None => {
             let mut answer = Err(io::Error::from_raw_os_error(libc::EINVAL));
-            for format in wish.format.map_or(UNLISTED.to_vec(), |f| vec![f]) {
+            for format in unlisted(wish) {
                 let next = ask(device, format, wish.size);
                 let taken = next.as_ref().is_ok_and(|g| g.fourcc == fourcc(format));
                 // A device with a fixed format refuses all, or answers with what it has.
@@ -140,7 +141,8 @@ pub(super) fn negotiate(
         }
     };
     let granted = granted.map_err(Err)?;
-    let Some(format) = granted.fourcc.str().ok().and_then(PixelFormat::from_fourcc) else {
+    let format = granted.fourcc.str().ok().and_then(PixelFormat::from_fourcc);
+    let Some(format) = format.filter(|f| f.is_depth() == wish.is_of_depth()) else {
         return Err(Ok(granted.fourcc.to_string()));
     };
     // Many devices have no rate to set; the frames' own times tell what it is.
@@ -159,6 +161,15 @@ pub(super) fn negotiate(
         stride: granted.stride as usize,
         modes,
     })
+}
+
+/// What a device is asked for that lists nothing.
+fn unlisted(wish: &Wish) -> Vec<PixelFormat> {
+    match wish.format {
+        Some(format) if format.is_depth() => PixelFormat::DEPTH.to_vec(),
+        Some(format) => vec![format],
+        None => UNLISTED.to_vec(),
+    }
 }
 
 fn ask(device: &Device, format: PixelFormat, size: Size) -> io::Result<Format> {

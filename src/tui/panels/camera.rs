@@ -1,7 +1,7 @@
 //! What was asked of the camera, what it gives, and what is lost on the way.
 
 use super::titled;
-use crate::model::{Background, Snapshot};
+use crate::model::{Background, DepthCameraState, Snapshot};
 use crate::tui::format::{count, millis, value};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
@@ -23,8 +23,13 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Span::styled(format!("p50 {}", millis(s.latency_p50_ms)), theme.strong()),
         Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
     ];
+    // With a depth camera there is no line to spare for what was asked for.
+    let first = match &s.camera.depth {
+        Some(depth) => row("depth", of_depth(depth, theme), theme),
+        None => row("asked", vec![or_dash(&s.format.asked)], theme),
+    };
     let mut lines = vec![
-        row("asked", vec![or_dash(&s.format.asked)], theme),
+        first,
         row("given", vec![given(s, theme)], theme),
         row("rate", rate(s, theme), theme),
         row("delay", delay, theme),
@@ -72,6 +77,19 @@ fn given(s: &Snapshot, theme: Theme) -> Span<'static> {
     } else {
         theme.strong()
     })
+}
+
+/// Images of the depth camera that were lost or dropped, and frames without one, or why it is gone.
+fn of_depth(depth: &DepthCameraState, theme: Theme) -> Vec<Span<'static>> {
+    if let Some(reason) = &depth.away {
+        return vec![Span::styled(format!("gone: {reason}"), theme.warning())];
+    }
+    let counts = depth.counts;
+    let lost = counts.images_lost.saturating_add(counts.images_dropped);
+    beside(
+        loss("lost", lost, theme),
+        loss("frames without", counts.frames_without, theme),
+    )
 }
 
 /// The camera's rate and that at which frames are worked off, or why there is none.

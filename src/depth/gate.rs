@@ -1,0 +1,90 @@
+//! Depths of a point over time: one that is far from all those before is of something else.
+
+use crate::model::{DepthSeen, Observation, TrackId};
+use crate::signal::median;
+use std::collections::BTreeMap;
+
+/// A point's depth is known by so many of its first ones: half a second, in which a few may be wrong.
+const FIRST: usize = 15;
+/// Fewer say nothing yet.
+const LEAST: usize = 5;
+/// No point of a tree comes nearer or goes away by more than this share of its distance: at that
+/// distance a tree that fills the picture is about as deep in all.
+const FARTHEST_SHARE: f64 = 0.25;
+
+/// Leaves out depths that cannot be those of a point: a marker or a point that was lost to what is
+/// behind the tree, or before it, has no depth there. A marker that was lost and is found again is held
+/// to what it was: some hundred bytes are kept of each point.
+#[derive(Clone, Debug, Default)]
+pub struct DepthGate {
+    first_m: BTreeMap<TrackId, Vec<f64>>,
+}
+
+impl DepthGate {
+    /// Takes the depths away that are not those of their points.
+    pub fn step(&mut self, observations: &mut [Observation]) {
+        for o in observations {
+            o.depth = o.depth.filter(|depth| self.is_of(o.id, depth));
+        }
+    }
+
+    fn is_of(&mut self, id: TrackId, depth: &DepthSeen) -> bool {
+        let depth_m = f64::from(depth.depth_m);
+        let first_m = self.first_m.entry(id).or_default();
+        if first_m.len() >= LEAST {
+            let usual_m = median(first_m.clone(), f64::total_cmp).unwrap_or(depth_m);
+            if (depth_m - usual_m).abs() > FARTHEST_SHARE * usual_m {
+                return false;
+            }
+        }
+        if first_m.len() < FIRST {
+            first_m.push(depth_m);
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(id: u32, depth_m: f64) -> Observation {
+        Observation {
+            id: TrackId(id),
+            u_px: 0.0,
+            v_px: 0.0,
+            fb_error_px: 0.0,
+            error_px: None,
+            confirmed: true,
+            depth: Some(DepthSeen {
+                depth_m: depth_m as f32,
+                sd_m: 0.006,
+            }),
+        }
+    }
+
+    #[test]
+    fn a_point_that_is_lost_to_a_wall_has_no_depth_there() {
+        let mut gate = DepthGate::default();
+        let mut kept = Vec::new();
+        for k in 0..60 {
+            // It sways by 0.3 m at 2 m, and is on a wall from frame 30 to 49.
+            let depth_m = match k {
+                30..50 => 4.7,
+                _ => 2.0 + 0.3 * (f64::from(k) / 5.0).sin(),
+            };
+            // In between it is not seen at all.
+            if k == 29 {
+                gate.step(&mut [seen(8, 3.0)]);
+                kept.push(true);
+                continue;
+            }
+            let mut observations = [seen(7, depth_m), seen(8, 3.0)];
+            gate.step(&mut observations);
+            kept.push(observations[0].depth.is_some());
+            assert!(observations[1].depth.is_some());
+        }
+        let missing: Vec<usize> = (0..60).filter(|k| !kept[*k]).collect();
+        assert_eq!(missing, (30..50).collect::<Vec<_>>());
+    }
+}
