@@ -22,6 +22,8 @@ none     no stroke, of the whole photograph and of five parts of it, in which th
          certainty, and whether the tree is right. It is if 0.8 of the traced length lies on the true tree (6 px), the foot is
          within 5 % of the tree's height, and in leaf the leaves meet the true ones by 0.6, or 0.4 of the true wood is
          covered of a bare one
+fit      JSON files of `none` in place of seeds: the weights of src/pipeline/certainty.rs. They are to be of a build whose
+         LEAST_CHANCE is 0, which makes doubtful trees, too
 
 Needs numpy, scipy and opencv-python-headless.
 """
@@ -36,6 +38,7 @@ from photos import iou
 
 HERE = Path(__file__).parent
 HALF = [(0.5, 0), (0, 0.5)]
+MOST_DEVIATIONS = 15.0  # as in src/pipeline/certainty.rs
 # Left, top, right, bottom of a part, as shares of the picture.
 PARTS = [(0, 0, 1, 1), (0.12, 0, 1, 1), (0, 0, 0.88, 1), (0.06, 0, 0.94, 1), (0.1, 0.15, 0.9, 1), (0, 0.1, 0.8, 0.95)]
 
@@ -44,12 +47,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("arborcam")
     parser.add_argument("work_dir", type=Path)
-    parser.add_argument("what", choices=["bad", "beside", "none"])
-    parser.add_argument("seeds", type=int, nargs="+")
+    parser.add_argument("what", choices=["bad", "beside", "none", "fit"])
+    parser.add_argument("seeds", nargs="+")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
+    if args.what == "fit":
+        return fit(args)
     rows = []
-    for seed in args.seeds:
+    for seed in map(int, args.seeds):
         photo = Photo(args, seed)
         for row in {"bad": bad, "beside": beside, "none": none}[args.what](photo):
             rows.append(dict(seed=seed, bare=seed % 2 == 1) | row)
@@ -201,13 +206,32 @@ def none(photo):
         path = photo.work / "trust-part.png"
         cv2.imwrite(str(path), image[top:bottom, left:right])
         out, said = photo.run(picture=path)
-        percent = re.search(r"(\d+) %", said[1])
-        row = dict(part=PARTS.index(part), made=out is not None, says=int(percent[1]) / 100 if percent else None)
+        percent = re.search(r"chance of (\d+) %", said[1])
+        row = dict(part=PARTS.index(part), made=out is not None, says=int(percent[1]) / 100 if percent else None) | evidence(said[1])
         if out:
             row["right"] = is_right(photo, out, (left, top, right, bottom), foot - (left, top))
         else:
             row["said"] = said[0]
         yield row
+
+
+def evidence(said):
+    """By how many standard errors the trunk is said to differ from what is beside it."""
+    found = re.search(r"the trunk differs .* by (-?[\d.]+) standard", said)
+    return dict(trunk=float(found[1]) if found else 0.0)
+
+
+def fit(args):
+    """Logistic regression of whether trees are right, by Newton's method; a weak prior (variance 10) keeps it finite."""
+    rows = [r for path in args.seeds for r in json.loads(Path(path).read_text()) if r["made"]]
+    x = np.array([[1, np.clip(r["trunk"], 0, MOST_DEVIATIONS), not r["bare"]] for r in rows], float)
+    y = np.array([r["right"] for r in rows], float)
+    weights = np.zeros(x.shape[1])
+    for _ in range(50):
+        chance = 1 / (1 + np.exp(-x @ weights))
+        hessian = (x * (chance * (1 - chance))[:, None]).T @ x + 0.1 * np.eye(len(weights))
+        weights += np.linalg.solve(hessian, x.T @ (y - chance) - 0.1 * weights)
+    print(f"{len(rows)} trees, {int(y.sum())} right; once, by trunk, in leaf:", weights.round(2).tolist())
 
 
 def is_right(photo, out, part, foot_px):

@@ -10,6 +10,8 @@
 mod angles;
 mod back;
 mod bark;
+#[cfg(feature = "opencv")]
+mod certainty;
 #[cfg(feature = "camera")]
 mod decode;
 mod drawn;
@@ -33,10 +35,14 @@ mod seen;
 mod sway;
 #[cfg(feature = "opencv")]
 mod tagged;
+#[cfg(feature = "opencv")]
+mod unaided;
 #[cfg(all(feature = "camera", feature = "opencv"))]
 mod wood;
 
 pub use back::{BackEnd, Followed, Moved};
+#[cfg(feature = "opencv")]
+pub use certainty::Certainty;
 #[cfg(feature = "camera")]
 pub use decode::{DecodeStage, Undecoded};
 pub use drawn::stand_drawn;

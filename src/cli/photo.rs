@@ -163,6 +163,9 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     let stop = Stop::on_signals()?;
     let like = args.like()?;
     let seen = seen(&shown, &drawn, options)?;
+    if !args.draw {
+        refuse_unlikely(&shown, &seen, &drawn)?;
+    }
     let growth = PhotoGrowth {
         subtrees: args.subtrees.into(),
         like: like.as_ref(),
@@ -253,24 +256,76 @@ fn seen(
     Ok(seen)
 }
 
+/// Refuses a tree that was found without strokes and is more likely wrong than right, unless the user has seen
+/// and accepted it.
+fn refuse_unlikely(
+    shown: &ShownPicture,
+    seen: &[TreeInPhoto],
+    drawn: &[DrawnTree],
+) -> Result<(), CommandError> {
+    for (tree, own) in seen.iter().zip(drawn) {
+        if let Some(found) = tree.found.filter(|found| !found.is_likely()) {
+            let missing = Missing::of(own);
+            return Err(CommandError::Failed(anyhow!(
+                "{}: {} is found without a stroke, but is right with a chance of {:.0} % only; draw with {}, or on \
+                 the screen with --draw",
+                shown.name,
+                missing.what(),
+                100.0 * found.chance(),
+                missing.options(),
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// What was not drawn of a tree.
+#[derive(Clone, Copy, Debug)]
+enum Missing {
+    Both,
+    Crown,
+    Trunk,
+}
+
+impl Missing {
+    /// Of a tree of which not all is drawn.
+    fn of(drawn: &DrawnTree) -> Self {
+        let strokes = &drawn.strokes;
+        match (strokes.crown_px.is_empty(), strokes.branches_px.is_empty()) {
+            (true, true) => Self::Both,
+            (true, false) => Self::Crown,
+            (false, _) => Self::Trunk,
+        }
+    }
+
+    fn what(self) -> &'static str {
+        match self {
+            Self::Both => "the tree",
+            Self::Crown => "the crown",
+            Self::Trunk => "the trunk",
+        }
+    }
+
+    fn options(self) -> &'static str {
+        match self {
+            Self::Both => "--crown and --branch",
+            Self::Crown => "--crown",
+            Self::Trunk => "--branch",
+        }
+    }
+}
+
 /// What is said of what was found without a stroke, and how sure that is.
 fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
-    let agreement = 100.0 * tree.agreement?;
-    let strokes = &drawn.strokes;
-    let (what, missing) = match (strokes.crown_px.is_empty(), strokes.branches_px.is_empty()) {
-        (true, true) => ("the tree was found without strokes", "--crown and --branch"),
-        (true, false) => ("the crown was found without a stroke", "--crown"),
-        (false, _) => ("the trunk was found without a stroke", "--branch"),
-    };
-    let trunk = tree
-        .seen
-        .trunk_deviations
-        .map_or(String::new(), |deviations| {
-            format!(", the trunk differs from what is beside it by {deviations:.1} standard errors")
-        });
+    let found = tree.found?;
+    let missing = Missing::of(drawn);
     Some(format!(
-        "{what}: two attempts agree by {agreement:.0} %{trunk}, which does not make it right; if it is \
-         wrong, draw with {missing}, or on the screen with --draw"
+        "{} was found without a stroke, and is right with a chance of {:.0} % (the trunk differs from what is \
+         beside it by {:.1} standard errors); if it is wrong, draw with {}, or on the screen with --draw",
+        missing.what(),
+        100.0 * found.chance(),
+        found.trunk_deviations,
+        missing.options(),
     ))
 }
 

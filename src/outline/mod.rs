@@ -8,10 +8,12 @@ mod laplacian;
 mod matting;
 mod middle;
 mod polygon;
+mod reduced;
 mod region;
 mod scribbles;
 mod solve;
 mod steady;
+mod stem;
 mod still;
 mod trunk;
 
@@ -19,9 +21,11 @@ pub use auto::{AutoOutline, Found, whole};
 pub use density::{DensityError, density};
 pub use error::OutlineError;
 pub use matting::{alpha, outline as from_scribbles};
-pub use middle::{InMiddle, in_middle};
+pub use middle::in_middle;
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
+pub use reduced::Reduced;
 pub use scribbles::{Given, Mark, Scribbles};
+pub use stem::stem;
 
 use crate::model::{Outline, Size};
 use nalgebra::Point2;

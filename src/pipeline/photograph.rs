@@ -2,11 +2,13 @@
 //! what is drawn on it to leaves, wood and the branches that are seen. It is called once by a command,
 //! and after every stroke by a screen.
 
+use super::certainty::Certainty;
+use super::unaided::{Attempt, Half, Place};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
-use crate::model::{Foot, FootBasis, Outline, Rgb, Size, TreeStrokes};
-use crate::outline::{self, OutlineError};
+use crate::model::{Outline, Rgb, Size, TreeStrokes};
+use crate::outline::{self, OutlineError, Reduced};
 use crate::wood::{self, LeafColour, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
@@ -15,14 +17,6 @@ use nalgebra::Point2;
 const CLOSE_SHARE: f64 = 0.008;
 const CLOSE_MOST: f64 = 0.06;
 const NEARLY_ALL: f64 = 0.93;
-/// Without a stroke the trunk is looked for up to this share of the tree's height, and has so many
-/// rows at least.
-const TRUNK_SHARE: f64 = 0.3;
-const LEAST_TRUNK_ROWS: usize = 12;
-/// The foot may be hidden: it is looked for in so many steps of this share of the tree's height higher up.
-const MOST_HIDDEN_STEPS: u32 = 5;
-const HIDDEN_STEP: f64 = 0.05;
-
 /// Channels of a pixel that differ by more than this make a colour, levels: what a JPEG of a grey
 /// picture may be off. A picture has colours if this share of it has one.
 const GREY_LEVELS: u8 = 4;
@@ -44,8 +38,8 @@ pub struct TreeInPhoto {
     pub crown: Outline,
     /// The trunk's first, from its foot up.
     pub strokes: Vec<Stroke>,
-    /// How far two attempts to find the tree without strokes agree, 0 to 1; `None` where all was drawn.
-    pub agreement: Option<f64>,
+    /// How sure it is that what was not drawn is found; `None` where all was drawn.
+    pub found: Option<Certainty>,
     pub seen: SeenInPhotograph,
     /// Whether the photograph has colours; else leaves are not looked for.
     pub has_colour: bool,
@@ -122,32 +116,98 @@ pub fn see_tree(
     options: PhotoOptions,
     cancel: &CancelToken,
 ) -> Result<TreeInPhoto, PhotoError> {
-    let Drawn {
-        crown,
-        strokes,
-        agreement,
-    } = Drawn::of(picture, drawn)?;
-    let has_colour = has_colour(picture);
-    let view = wood::Photograph {
+    let looked = Looked {
         picture,
-        crown: &crown,
-        strokes: &strokes,
-        leaf_colour: options.leaf_colour,
-        trace_by: options.trace_by,
+        drawn,
+        options,
+        cancel,
     };
-    let seen = wood::in_photograph(view, cancel).map_err(|e| not_seen(e, drawn))?;
-    let branches = &seen.wood.branches;
-    let is_met = |at: &Point2<f64>| branches.piece_at(*at, picture.size).is_some();
-    if let Some(apart) = strokes.iter().position(|s| !s.iter().any(is_met)) {
-        return Err(PhotoError::Apart { number: apart + 1 });
+    let mut strokes = drawn.branches_px.clone();
+    refuse_off_picture(&strokes, picture.size)?;
+    if let Some([first, .., last]) = strokes.first_mut().map(|s| &mut s[..])
+        && first.y < last.y
+    {
+        strokes[0].reverse();
     }
-    Ok(TreeInPhoto {
-        crown,
-        strokes,
-        agreement,
-        seen,
-        has_colour,
-    })
+    let crown = match drawn.crown_px.is_empty() {
+        true => None,
+        false => Some(crown(&drawn.crown_px, picture.size)?),
+    };
+    match crown {
+        Some(crown) if !strokes.is_empty() => looked.see(Attempt { crown, strokes }),
+        crown => looked.best(&Half { crown, strokes }),
+    }
+}
+
+/// A photograph that is looked at.
+struct Looked<'a> {
+    picture: &'a Rgb,
+    drawn: &'a TreeStrokes,
+    options: PhotoOptions,
+    cancel: &'a CancelToken,
+}
+
+impl Looked<'_> {
+    /// The tree along these strokes.
+    fn see(&self, strokes: Attempt) -> Result<TreeInPhoto, PhotoError> {
+        let Attempt { crown, strokes } = strokes;
+        let view = wood::Photograph {
+            picture: self.picture,
+            crown: &crown,
+            strokes: &strokes,
+            leaf_colour: self.options.leaf_colour,
+            trace_by: self.options.trace_by,
+        };
+        let seen = wood::in_photograph(view, self.cancel).map_err(|e| not_seen(e, self.drawn))?;
+        let branches = &seen.wood.branches;
+        let size = self.picture.size;
+        for (number, stroke) in (1..).zip(&strokes) {
+            if !stroke
+                .iter()
+                .any(|at| branches.piece_at(*at, size).is_some())
+            {
+                return Err(PhotoError::Apart { number });
+            }
+        }
+        Ok(TreeInPhoto {
+            crown,
+            strokes,
+            found: None,
+            seen,
+            has_colour: has_colour(self.picture),
+        })
+    }
+
+    /// Of all attempts to find what was not drawn the one that is most likely right.
+    fn best(&self, half: &Half) -> Result<TreeInPhoto, PhotoError> {
+        let colour = self.options.leaf_colour.unwrap_or_default();
+        let reduced = Reduced::of(self.picture).map_err(failed)?;
+        let mut best: Option<(Certainty, TreeInPhoto)> = None;
+        let mut why = PhotoError::NoTree;
+        for place in Place::ALL {
+            if best.as_ref().is_some_and(|(found, _)| found.is_sure()) {
+                break;
+            }
+            for attempt in half.attempts(&reduced, place, colour)? {
+                let tree = match self.see(attempt) {
+                    Ok(tree) => tree,
+                    Err(PhotoError::Cancelled) => return Err(PhotoError::Cancelled),
+                    Err(e) => {
+                        why = e;
+                        continue;
+                    }
+                };
+                let found = Certainty::of(&tree.seen);
+                let known = best.as_ref().map_or(0.0, |(known, _)| known.chance());
+                if found.chance() > known {
+                    best = Some((found, tree));
+                }
+            }
+        }
+        let (found, tree) = best.ok_or(why)?;
+        let found = Some(found);
+        Ok(TreeInPhoto { found, ..tree })
+    }
 }
 
 /// Why nothing is seen, by what was drawn: what was only found is no stroke that could be at fault.
@@ -168,13 +228,13 @@ fn not_seen(e: NotSeen, drawn: &TreeStrokes) -> PhotoError {
 
 /// Whether a picture is more than grey.
 fn has_colour(picture: &Rgb) -> bool {
-    let is_coloured = |pixel: &&[u8; 3]| {
-        let [red, green, blue] = **pixel;
-        red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
-    };
     let (pixels, _) = picture.pixels.as_chunks::<3>();
-    let coloured = pixels.iter().filter(is_coloured).count();
+    let coloured = pixels.iter().filter(|pixel| is_coloured(**pixel)).count();
     coloured as f64 > COLOUR_SHARE * pixels.len() as f64
+}
+
+fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
+    red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
 }
 
 impl TreeInPhoto {
@@ -204,49 +264,6 @@ impl TreeInPhoto {
     }
 }
 
-/// Crown and strokes, drawn or found.
-struct Drawn {
-    crown: Outline,
-    strokes: Vec<Stroke>,
-    agreement: Option<f64>,
-}
-
-impl Drawn {
-    fn of(picture: &Rgb, drawn: &TreeStrokes) -> Result<Self, PhotoError> {
-        let mut strokes = drawn.branches_px.clone();
-        refuse_off_picture(&strokes, picture.size)?;
-        if let Some([first, .., last]) = strokes.first_mut().map(|s| &mut s[..])
-            && first.y < last.y
-        {
-            strokes[0].reverse();
-        }
-        let crown = match drawn.crown_px.is_empty() {
-            true => None,
-            false => Some(crown(&drawn.crown_px, picture.size)?),
-        };
-        if let (Some(crown), false) = (&crown, strokes.is_empty()) {
-            return Ok(Self {
-                crown: crown.clone(),
-                strokes,
-                agreement: None,
-            });
-        }
-        let middle = outline::in_middle(picture).map_err(failed)?;
-        let middle = middle.ok_or(PhotoError::NoTree)?;
-        let mut outlines = middle.outlines.into_iter();
-        let with_trunk = outlines.find_map(|outline| Some((trunk_of(&outline)?, outline)));
-        let (trunk, outline) = with_trunk.ok_or(PhotoError::NoTree)?;
-        if strokes.is_empty() {
-            strokes.push(trunk);
-        }
-        Ok(Self {
-            crown: crown.unwrap_or(outline),
-            strokes,
-            agreement: Some(middle.agreement),
-        })
-    }
-}
-
 fn refuse_off_picture(strokes: &[Stroke], size: Size) -> Result<(), PhotoError> {
     for (number, stroke) in (1..).zip(strokes) {
         if let Some(off) = stroke.iter().find(|at| !size.contains(**at)) {
@@ -261,7 +278,7 @@ fn crown(corners_px: &[Point2<f64>], size: Size) -> Result<Outline, PhotoError> 
     outline::from_polygon(corners_px, size).map_err(PhotoError::BadCrown)
 }
 
-fn failed(e: impl std::fmt::Display) -> PhotoError {
+pub(super) fn failed(e: impl std::fmt::Display) -> PhotoError {
     PhotoError::Failed {
         what: e.to_string(),
     }
@@ -282,89 +299,5 @@ fn closed(size: Size, tree: &[u8]) -> Result<Outline, OutlineError> {
             return Ok(found);
         }
         share *= 2.0;
-    }
-}
-
-/// A line along the trunk of the tree in an outline, from its foot up; `None` where it has none. A bush
-/// or a shadow may hide the foot: then the trunk begins where it comes out of that.
-fn trunk_of(outline: &Outline) -> Option<Stroke> {
-    let [_, top, _, bottom] = outline.bounds_px()?;
-    let height = f64::from(bottom - top + 1);
-    (0..=MOST_HIDDEN_STEPS).find_map(|step| {
-        let hidden = (HIDDEN_STEP * f64::from(step) * height) as u32;
-        trunk_in(&above(outline, bottom.saturating_sub(hidden)))
-    })
-}
-
-/// What of an outline is not below a row.
-fn above(outline: &Outline, lowest: u32) -> Outline {
-    let mut above = outline.clone();
-    let first_below = (lowest as usize + 1) * outline.size.width as usize;
-    for pixel in above.mask.iter_mut().skip(first_below) {
-        *pixel = 0;
-    }
-    above
-}
-
-fn trunk_in(outline: &Outline) -> Option<Stroke> {
-    let foot = Foot::of(outline, None);
-    let rows = foot.trunk_rows(outline, TRUNK_SHARE);
-    let places = rows.iter().map(|row| {
-        let middle = 0.5 * f64::from(row.first + row.last);
-        Point2::new(middle, f64::from(row.v))
-    });
-    let line: Stroke = places.collect();
-    let is_seen = foot.basis != FootBasis::Guessed && line.len() >= LEAST_TRUNK_ROWS;
-    is_seen.then_some(line)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SIZE: Size = Size {
-        width: 200,
-        height: 200,
-    };
-
-    /// A crown on a trunk, maybe with a bush before its foot.
-    fn tree(has_bush: bool) -> Outline {
-        let mut mask = Vec::with_capacity(SIZE.area());
-        for i in 0..SIZE.area() {
-            let [u, v] = [(i % 200) as f64, (i / 200) as f64];
-            let is_crown = (u - 100.0).hypot(v - 60.0) < 50.0;
-            let is_trunk = (u - 100.0).abs() < 4.0 && (60.0..190.0).contains(&v);
-            let is_bush = has_bush && (u - 110.0).hypot(v - 185.0) < 25.0;
-            mask.push(if is_crown || is_trunk || is_bush {
-                255
-            } else {
-                0
-            });
-        }
-        Outline {
-            size: SIZE,
-            mask,
-            polygon_px: Vec::new(),
-            matte: None,
-        }
-    }
-
-    #[test]
-    fn a_trunk_is_found_above_a_bush_at_its_foot() {
-        for (has_bush, lowest) in [(false, 180.0..190.0), (true, 140.0..165.0)] {
-            let line = trunk_of(&tree(has_bush)).expect("a trunk");
-            assert!(lowest.contains(&line[0].y), "{has_bush}: {}", line[0]);
-            assert!(line.iter().all(|at| (at.x - 100.0).abs() < 8.0), "{line:?}");
-            assert!(line[line.len() - 1].y < line[0].y - 15.0, "{line:?}");
-        }
-    }
-
-    #[test]
-    fn what_has_no_trunk_has_none_higher_up_either() {
-        let mut crown = tree(false);
-        for pixel in crown.mask.iter_mut().skip(105 * 200) {
-            *pixel = 0;
-        }
-        assert_eq!(trunk_of(&crown), None);
     }
 }

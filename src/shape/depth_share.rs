@@ -9,21 +9,30 @@ const CROWN_SHARE: f64 = 0.3;
 const MOST_STRETCHED: f64 = 3.0;
 
 /// Stretches all depths by one factor, so that the deviation of the crown's wood from front to back is
-/// `share` of that from side to side. Places in the picture stay; a flat tree stays flat.
+/// `share` of the geometric mean of that from side to side and the tree's height. Places in the picture stay; a
+/// flat tree stays flat.
+///
+/// By the width alone a crown of which two limbs happen to lie in the picture's plane becomes deep too, and one
+/// whose limbs lie behind each other becomes shallow.
 pub fn set_depth_share(tree: &mut Skeleton, share: f64) {
-    let Spread { across, deep } = Spread::of(tree);
+    let Spread {
+        height,
+        across,
+        deep,
+    } = Spread::of(tree);
     if deep <= 0.0 || across <= 0.0 {
         return;
     }
-    let factor = share * across / deep;
+    let factor = share * (across * height).sqrt() / deep;
     let factor = factor.clamp(1.0 / MOST_STRETCHED, MOST_STRETCHED);
     for node in &mut tree.nodes {
         node.position.z *= factor;
     }
 }
 
-/// Deviation of the crown's wood to the side and to the front, px; by its length.
+/// Height of a tree, and deviation of its crown's wood to the side and to the front by its length, px.
 struct Spread {
+    height: f64,
     across: f64,
     deep: f64,
 }
@@ -31,7 +40,8 @@ struct Spread {
 impl Spread {
     fn of(tree: &Skeleton) -> Self {
         let heights = tree.nodes.iter().map(|node| node.position.y);
-        let low_px = CROWN_SHARE * heights.fold(0.0, f64::max);
+        let height = heights.fold(0.0, f64::max);
+        let low_px = CROWN_SHARE * height;
         let mut pieces: Vec<Piece> = Vec::with_capacity(tree.nodes.len());
         for node in &tree.nodes {
             let Some(parent) = node.parent.map(|p| tree.nodes[p.index()].position) else {
@@ -46,6 +56,7 @@ impl Spread {
             }
         }
         Self {
+            height,
             across: deviation(&pieces, 0),
             deep: deviation(&pieces, 2),
         }
@@ -83,9 +94,14 @@ mod tests {
             node.position.z = 20.0 * (k as f64 - 3.0);
         }
         let before = tree.clone();
-        set_depth_share(&mut tree, 0.6);
-        let Spread { across, deep } = Spread::of(&tree);
-        assert!((deep / across - 0.6).abs() < 1e-9, "{deep} {across}");
+        set_depth_share(&mut tree, 0.3);
+        let Spread {
+            height,
+            across,
+            deep,
+        } = Spread::of(&tree);
+        let wanted = 0.3 * (across * height).sqrt();
+        assert!((deep - wanted).abs() < 1e-9, "{deep} {wanted}");
         for (node, own) in tree.nodes.iter().zip(&before.nodes) {
             assert_eq!(node.position.xy(), own.position.xy());
         }
@@ -93,7 +109,7 @@ mod tests {
             node.position.z = 0.0;
         }
         let flat = tree.clone();
-        set_depth_share(&mut tree, 0.6);
+        set_depth_share(&mut tree, 0.3);
         assert_eq!(tree, flat);
     }
 }

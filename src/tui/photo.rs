@@ -53,8 +53,8 @@ pub struct FoundTree {
     /// Its branches and the masks of wood and leaves.
     pub wood: Wood,
     pub in_leaf: bool,
-    /// How far two attempts agree where it is found without strokes, 0 to 1.
-    pub agreement: Option<f64>,
+    /// The chance that it is right where it is found without strokes, 0 to 1.
+    pub certainty: Option<f64>,
 }
 
 /// What a key does while nothing is being drawn.
@@ -338,8 +338,10 @@ impl Sheet {
     }
 
     fn accept(&mut self) -> Next {
-        let is_begun = |tree: &Tree| self.trees.len() == 1 || !tree.strokes.is_empty();
-        for (number, tree) in (1..).zip(&self.trees).filter(|(_, tree)| is_begun(tree)) {
+        for (number, tree) in (1..).zip(&self.trees) {
+            if self.trees.len() > 1 && tree.strokes.is_empty() {
+                continue;
+            }
             let why = match tree.found.as_deref() {
                 Some(Ok(_)) => continue,
                 Some(Err(why)) => why.as_str(),
@@ -365,9 +367,9 @@ impl Sheet {
             Ok(found) => {
                 let look = if found.in_leaf { "in leaf" } else { "bare" };
                 let tips = found.wood.branches.tips();
-                let sure = found.agreement.map_or(String::new(), |agreement| {
-                    let percent = 100.0 * agreement;
-                    format!("; found without strokes, two attempts agree by {percent:.0} %")
+                let sure = found.certainty.map_or(String::new(), |certainty| {
+                    let percent = 100.0 * certainty;
+                    format!("; found without strokes, right with a chance of {percent:.0} %")
                 });
                 format!("{look}, wood with {tips} tips{sure}. Enter accepts.")
             }

@@ -254,16 +254,16 @@ fn best_rows(sections: &[Option<Section>]) -> Option<Vec<Option<Section>>> {
     let radii = sections.iter().flatten().map(|s| s.radius_px).collect();
     let wanted_px = PI * quantile(radii, 0.5)?;
     let length = ((wanted_px / STEP_PX).round() as usize).clamp(1, sections.len());
-    let seen = |from: usize| sections[from..from + length].iter().flatten().count();
-    let mut best = 0;
-    for from in 1..=sections.len() - length {
-        if seen(from) > seen(best) {
-            best = from;
+    let (mut best, mut most) = (0, 0);
+    for (from, stretch) in sections.windows(length).enumerate() {
+        let seen = stretch.iter().flatten().count();
+        if seen > most {
+            (best, most) = (from, seen);
         }
     }
     let rows = (0..PATCH as usize).rev();
-    let row = |k: usize| sections[best + k * length / PATCH as usize];
-    Some(rows.map(row).collect())
+    let rows = rows.map(|k| sections[best + k * length / PATCH as usize]);
+    Some(rows.collect())
 }
 
 /// Divides every texel by the mean of those around it, so that what is left is bark and not light,

@@ -56,8 +56,8 @@ pub fn branches(wood: &WoodMask, foot_px: Point2<f64>) -> opencv::Result<BranchG
 
 /// The place of wood that is nearest to a place, px of the mask.
 fn nearest_wood(wood: &WoodMask, to: Point2<f64>) -> Option<Point2<f64>> {
-    let is_wood = |pixel: &usize| wood.mask[*pixel] != 0;
-    let places = (0..wood.mask.len()).filter(is_wood).map(|p| wood.place(p));
+    let pixels = wood.mask.iter().enumerate().filter(|(_, m)| **m != 0);
+    let places = pixels.map(|(pixel, _)| wood.place(pixel));
     places.min_by(|a, b| distance(a, &to).total_cmp(&distance(b, &to)))
 }
 
@@ -107,25 +107,32 @@ impl Tracer<'_> {
     /// The middles of the arcs of wood on the circle about a centre.
     fn crossings(&self, centre: Point2<f64>) -> Vec<Point2<f64>> {
         let steps = (TAU * self.radius).ceil() as usize;
-        let on_circle = |step: f64| {
-            let angle = TAU * step / steps as f64;
-            centre + self.radius * Vector2::new(angle.cos(), angle.sin())
-        };
-        let is_wood = |step: usize| self.wood.holds(on_circle(step as f64));
+        let mut is_wood = Vec::with_capacity(steps);
+        for step in 0..steps {
+            let at = self.on_circle(centre, step as f64 / steps as f64);
+            is_wood.push(self.wood.holds(at));
+        }
         let mut crossings = Vec::new();
         // Arcs are followed from a gap on. A circle that is all wood crosses no branch.
-        let Some(gap) = (0..steps).find(|step| !is_wood(*step)) else {
+        let Some(gap) = is_wood.iter().position(|is_wood| !is_wood) else {
             return crossings;
         };
         let mut begin = None;
         for step in gap + 1..=gap + steps {
-            if is_wood(step) {
+            if is_wood[step % steps] {
                 begin.get_or_insert(step);
             } else if let Some(begin) = begin.take() {
-                crossings.push(on_circle(0.5 * (begin + step - 1) as f64));
+                let middle = 0.5 * (begin + step - 1) as f64;
+                crossings.push(self.on_circle(centre, middle / steps as f64));
             }
         }
         crossings
+    }
+
+    /// The place on the circle about a centre at this share of its round.
+    fn on_circle(&self, centre: Point2<f64>, share: f64) -> Point2<f64> {
+        let angle = TAU * share;
+        centre + self.radius * Vector2::new(angle.cos(), angle.sin())
     }
 
     /// Whether the straight way between two places is all wood.

@@ -156,8 +156,8 @@ fn without_tip<'a>(grid: &Grid, track: &'a Track, fork: usize) -> &'a [usize] {
         .map(|pixel| grid.inside[*pixel])
         .fold(0.0, f32::max);
     let tip = grid.place(pixels[last]);
-    let is_in_tip = |pixel: &&usize| (grid.place(**pixel) - tip).norm() < f64::from(radius);
-    let in_tip = pixels.iter().rev().take_while(is_in_tip).count();
+    let off_tip = pixels.iter().rev().map(|p| (grid.place(*p) - tip).norm());
+    let in_tip = off_tip.take_while(|off| *off < f64::from(radius)).count();
     &pixels[..(last + 1 - in_tip).max(fork + 1).max(2).min(last + 1)]
 }
 
@@ -171,8 +171,8 @@ fn meet(grid: &Grid, a: &Track, b: &Track) -> bool {
     if apart > MEET_RADII * radius + MEET_PX {
         return false;
     }
-    let came = |track: &Track| way_back(grid, &track.pixels, over(radius));
-    let ways = came(a).zip(came(b));
+    let [came_a, came_b] = [a, b].map(|track| way_back(grid, &track.pixels, over(radius)));
+    let ways = came_a.zip(came_b);
     ways.is_some_and(|(a, b)| a.angle(&-b) < MOST_TURN)
 }
 
@@ -195,8 +195,8 @@ impl<'a> Fork<'a> {
         let fork = grid.place(track.pixels[0]);
         let radius = f64::from(grid.inside[track.pixels[0]]);
         let on_limb = ON_LIMB_RADII * radius + ON_LIMB_PX;
-        let is_beyond = |pixel: &usize| (grid.place(*pixel) - fork).norm() > on_limb;
-        let beyond = track.pixels.iter().position(is_beyond)?;
+        let mut off_fork = track.pixels.iter().map(|p| (grid.place(*p) - fork).norm());
+        let beyond = off_fork.position(|off| off > on_limb)?;
         let way = way(grid, track.pixels[beyond..].iter(), over(radius))?;
         let came = way_back(grid, &limb.pixels[..=leaves.index], over(radius))?;
         Some(Self {
@@ -272,8 +272,8 @@ fn carriers(tracks: &[Track]) -> Vec<Option<OnTrack>> {
 /// A track, what carries it, and so on down to the foot. A ring would be a fault; it is not followed
 /// round for ever.
 fn down(carriers: &[Option<OnTrack>], track: usize) -> impl Iterator<Item = usize> {
-    let carrier = |t: &usize| carriers[*t].map(|leaves| leaves.track);
-    std::iter::successors(Some(track), carrier).take(carriers.len() + 1)
+    let downwards = std::iter::successors(Some(track), |t| Some(carriers[*t]?.track));
+    downwards.take(carriers.len() + 1)
 }
 
 /// Whether a track is another one, or is carried by it.

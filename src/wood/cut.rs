@@ -208,11 +208,13 @@ impl Flow {
                 self.adopt(orphan);
             }
         }
-        let is_first = |pixel| {
-            let at = self.framed(pixel);
-            self.origin[at] != Origin::Free && !self.is_second[at]
-        };
-        Some((0..self.size.area()).map(is_first).collect())
+        let pixels = 0..self.size.area();
+        Some(pixels.map(|pixel| self.is_first(pixel)).collect())
+    }
+
+    fn is_first(&self, pixel: usize) -> bool {
+        let at = self.framed(pixel);
+        self.origin[at] != Origin::Free && !self.is_second[at]
     }
 
     /// What more can flow along the step that leads from the label of `at`'s tree outwards: from

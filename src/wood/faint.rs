@@ -108,16 +108,8 @@ fn is_faint(graph: &BranchGraph, end: usize, picture: &Rgb, bark: &Vector3<f64>)
 /// behind it.
 fn half_width_px(piece: &Piece, radius_px: f64, picture: &Rgb, bark: &Vector3<f64>) -> Option<f64> {
     let edge_px = radius_px + BESIDE_PX;
-    let behind = |side: f64| {
-        let mut colours = Vec::new();
-        let mut off_px = edge_px + STEP_PX;
-        while off_px <= edge_px + BEHIND_PX {
-            colours.extend(piece.colours(picture, side * off_px));
-            off_px += STEP_PX;
-        }
-        median_colour(&colours)
-    };
-    let (left, right) = (behind(1.0)?, behind(-1.0)?);
+    let left = colour_behind(piece, picture, edge_px, 1.0)?;
+    let right = colour_behind(piece, picture, edge_px, -1.0)?;
     let n_steps = (2.0 * edge_px / STEP_PX).ceil() as usize;
     let step_px = 2.0 * edge_px / n_steps as f64;
     let mut width_px = 0.0;
@@ -135,13 +127,25 @@ fn half_width_px(piece: &Piece, radius_px: f64, picture: &Rgb, bark: &Vector3<f6
     Some(0.5 * width_px)
 }
 
+/// The colour of what is beyond the edge of a piece, to its left (1) or its right (-1).
+fn colour_behind(piece: &Piece, picture: &Rgb, edge_px: f64, side: f64) -> Option<Vector3<f64>> {
+    let mut colours = Vec::new();
+    let mut off_px = edge_px + STEP_PX;
+    while off_px <= edge_px + BEHIND_PX {
+        colours.extend(piece.colours(picture, side * off_px));
+        off_px += STEP_PX;
+    }
+    median_colour(&colours)
+}
+
 /// The median of each component; `None` of no colours.
 fn median_colour(colours: &[Vector3<f64>]) -> Option<Vector3<f64>> {
-    let of = |component: usize| {
+    let mut medians = Vector3::zeros();
+    for component in 0..3 {
         let values = colours.iter().map(|colour| colour[component]);
-        median(values.collect(), f64::total_cmp)
-    };
-    Some(Vector3::new(of(0)?, of(1)?, of(2)?))
+        medians[component] = median(values.collect(), f64::total_cmp)?;
+    }
+    Some(medians)
 }
 
 #[cfg(test)]

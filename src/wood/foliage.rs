@@ -8,7 +8,7 @@
 
 use super::colours::{Colours, colour_at};
 use super::cut::{PAIRS, is_diagonal, least_cut, links_within};
-use super::mixture::{Mixture, Normal};
+use super::mixture::{LogRatio, Mixture, Normal};
 use crate::cancel::CancelToken;
 use crate::model::{Rgb, bounds_px};
 use crate::signal::statistics::otsu;
@@ -23,12 +23,16 @@ const LEAST_DIFFERENCE: f64 = 1.0;
 /// Light that is added to a part's before its share of a colour is taken: dark parts count as grey.
 const DARK: f64 = 30.0;
 /// No leaf has less of its colour than this, see [`LeafColour::score`].
-const LEAST_SCORE: f64 = 0.125;
+pub const LEAST_SCORE: f64 = 0.125;
 /// Parts of the mixture of the ground below a crown; fewer colours than this show none. In the upper part
 /// of the crown, by this share of its height, there is no ground.
 const GROUND_PARTS: usize = 5;
 const LEAST_GROUND: f64 = 400.0;
 const HIGH_SHARE: f64 = 0.75;
+/// Parts of the mixture of bark that was drawn outside of the crown (as of wood: Tan et al. 2008 sect. 2.2);
+/// fewer colours than this show none.
+const BARK_PARTS: usize = 5;
+const LEAST_BARK: f64 = 64.0;
 /// A crown is in leaf where leaves have so great a share of it.
 const IN_LEAF: f64 = 0.15;
 
@@ -57,7 +61,7 @@ impl LeafColour {
 
     /// How much a colour (red, green, blue; 0 to 255) is of this one: above 0 by its share of the
     /// light, 1 at most.
-    fn score(self, colour: &Vector3<f64>) -> f64 {
+    pub(super) fn score(self, colour: &Vector3<f64>) -> f64 {
         let [red, green, blue] = [colour.x, colour.y, colour.z];
         let light = red + green + blue + DARK;
         match self {
@@ -72,61 +76,93 @@ impl LeafColour {
     }
 }
 
-/// Which pixels are leaves, 255 or 0, row by row, within `region` (one byte a pixel, 0 outside);
-/// none where the crown has too little of this `colour`. `None` where `cancel` ends the work.
-pub fn foliage(
-    picture: &Rgb,
-    region: &[u8],
-    colour: LeafColour,
-    cancel: &CancelToken,
-) -> Option<Vec<u8>> {
-    let bare = vec![0; picture.size.area()];
-    let mixture = Mixture::learned(&Colours::of(picture, |i| region[i] != 0), PARTS);
-    let ground = Ground::under(picture, region);
-    let Some(clusters) = Clusters::of(&mixture, colour) else {
-        return Some(bare);
-    };
-    let mut odds = vec![0.0; picture.size.area()];
-    for (i, odds) in odds.iter_mut().enumerate().filter(|(i, _)| region[*i] != 0) {
-        let colour = colour_at(picture, i);
-        let of_ground = ground
-            .as_ref()
-            .map_or(0.0, |ground| ground.density(i, &colour));
-        let of_others = clusters.others.density(&colour).max(of_ground);
-        let ratio = clusters.leaves.density(&colour) / of_others;
-        *odds = ratio.ln() as f32;
-    }
-    let links = links(picture, region);
-    let is_leaf = least_cut(picture.size, &odds, &links, cancel)?;
-    let mut mask = bare;
-    for (i, is_leaf) in is_leaf.into_iter().enumerate() {
-        mask[i] = if is_leaf && region[i] != 0 { 255 } else { 0 };
-    }
-    Some(mask)
+/// What is known of a crown before its colours are looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct InCrown<'a> {
+    pub picture: &'a Rgb,
+    /// One byte a pixel, row by row, 0 outside.
+    pub region: &'a [u8],
+    /// Of each pixel whether it is bark for sure: where a branch was drawn outside of the crown.
+    pub is_bark: &'a [bool],
 }
 
-/// The parts of a mixture that are leaves, and the others.
-struct Clusters {
-    leaves: Mixture,
-    others: Mixture,
+/// The leaves of a crown.
+pub struct Foliage {
+    /// Which pixels are leaves, 255 or 0, row by row, within the crown.
+    pub mask: Vec<u8>,
+    /// The odds that a colour is of leaves and of nothing else within the crown.
+    pub odds: LogRatio,
 }
 
-impl Clusters {
-    /// `None` where too little is of the colour of leaves, or nothing is of another.
-    fn of(mixture: &Mixture, colour: LeafColour) -> Option<Self> {
-        let mut histogram = [0; 256];
-        for part in &mixture.parts {
-            histogram[level(colour.score(&part.mean))] += (1000.0 * part.share) as u32;
+impl Foliage {
+    /// `None` where the crown has too little of this `colour`, and where `cancel` ends the work.
+    pub fn of(crown: InCrown, colour: LeafColour, cancel: &CancelToken) -> Option<Self> {
+        let InCrown {
+            picture, region, ..
+        } = crown;
+        let mixture = Mixture::learned(&Colours::of(picture, |i| region[i] != 0), PARTS);
+        let own = leaves_and_others(&mixture, colour)?;
+        let rivals = Rivals::of(crown);
+        let mut odds = vec![0.0; picture.size.area()];
+        for (i, odds) in odds.iter_mut().enumerate().filter(|(i, _)| region[*i] != 0) {
+            let colour = colour_at(picture, i);
+            let of_others = own.second.density(&colour).max(rivals.density(i, &colour));
+            let ratio = own.first.density(&colour) / of_others;
+            *odds = ratio.ln() as f32;
         }
-        let least = f64::from(otsu(&histogram)).max(level(LEAST_SCORE) as f64);
-        let is_leaf = |part: &Normal| level(colour.score(&part.mean)) as f64 > least;
-        let (leaves, others): (Vec<Normal>, Vec<Normal>) =
-            mixture.parts.iter().cloned().partition(is_leaf);
-        let share: f64 = leaves.iter().map(|part| part.share).sum();
-        (share >= IN_LEAF && !others.is_empty()).then(|| Self {
-            leaves: Mixture::of_parts(&leaves),
-            others: Mixture::of_parts(&others),
-        })
+        let links = links(picture, region);
+        let is_leaf = least_cut(picture.size, &odds, &links, cancel)?;
+        let mut mask = vec![0; picture.size.area()];
+        for (i, is_leaf) in is_leaf.into_iter().enumerate() {
+            mask[i] = if is_leaf && region[i] != 0 { 255 } else { 0 };
+        }
+        Some(Self { mask, odds: own })
+    }
+}
+
+/// The parts of a mixture that are leaves, and the others; `None` where too little is of the colour of leaves,
+/// or nothing is of another.
+fn leaves_and_others(mixture: &Mixture, colour: LeafColour) -> Option<LogRatio> {
+    let mut histogram = [0; 256];
+    for part in &mixture.parts {
+        histogram[level(colour.score(&part.mean))] += (1000.0 * part.share) as u32;
+    }
+    let least = f64::from(otsu(&histogram)).max(level(LEAST_SCORE) as f64);
+    let (mut leaves, mut others) = (Vec::new(), Vec::new());
+    for part in mixture.parts.iter().cloned() {
+        match level(colour.score(&part.mean)) as f64 > least {
+            true => leaves.push(part),
+            false => others.push(part),
+        }
+    }
+    let share: f64 = leaves.iter().map(|part: &Normal| part.share).sum();
+    (share >= IN_LEAF && !others.is_empty()).then(|| LogRatio {
+        first: Mixture::of_parts(&leaves),
+        second: Mixture::of_parts(&others),
+    })
+}
+
+/// What may look like leaves within a crown and is known from outside of it: the ground below it, and bark,
+/// which in the shade is as dark as leaves are.
+struct Rivals {
+    ground: Option<Ground>,
+    bark: Option<Mixture>,
+}
+
+impl Rivals {
+    fn of(crown: InCrown) -> Self {
+        let bark = Colours::of(crown.picture, |i| crown.is_bark[i] && crown.region[i] == 0);
+        Self {
+            ground: Ground::under(crown.picture, crown.region),
+            bark: (bark.count() >= LEAST_BARK).then(|| Mixture::learned(&bark, BARK_PARTS)),
+        }
+    }
+
+    /// How dense their colours are at that of a pixel.
+    fn density(&self, pixel: usize, colour: &Vector3<f64>) -> f64 {
+        let of_ground = self.ground.as_ref().map(|g| g.density(pixel, colour));
+        let of_bark = self.bark.as_ref().map(|bark| bark.density(colour));
+        of_ground.unwrap_or(0.0).max(of_bark.unwrap_or(0.0))
     }
 }
 
@@ -198,14 +234,27 @@ mod tests {
         Rgb { size, pixels }
     }
 
-    fn found(leaf: [i64; 3], colour: LeafColour) -> [usize; 2] {
-        let picture = halves(leaf);
-        let mask = foliage(&picture, &[255; 80 * 60], colour, &CancelToken::new()).expect("a cut");
-        let count = |is_left: bool| {
-            let pixels = (0..mask.len()).filter(|i| (i % 80 < 40) == is_left);
-            pixels.filter(|i| mask[*i] != 0).count()
+    /// The mask of leaves within a region, without a branch that was drawn.
+    fn mask_of(picture: &Rgb, region: &[u8], colour: LeafColour) -> Option<Vec<u8>> {
+        let crown = InCrown {
+            picture,
+            region,
+            is_bark: &vec![false; region.len()],
         };
-        [count(true), count(false)]
+        Foliage::of(crown, colour, &CancelToken::new()).map(|found| found.mask)
+    }
+
+    /// Pixels with leaves in the left half and in the right one.
+    fn found(leaf: [i64; 3], colour: LeafColour) -> [usize; 2] {
+        let mask = mask_of(&halves(leaf), &[255; 80 * 60], colour).unwrap_or_default();
+        let (mut left, mut right) = (0, 0);
+        for (i, _) in mask.iter().enumerate().filter(|(_, m)| **m != 0) {
+            match i % 80 < 40 {
+                true => left += 1,
+                false => right += 1,
+            }
+        }
+        [left, right]
     }
 
     #[test]
@@ -237,26 +286,52 @@ mod tests {
             region.push(if i / 80 < 50 { 255 } else { 0 });
         }
         let picture = Rgb { size, pixels };
-        let mask = foliage(&picture, &region, LeafColour::Green, &CancelToken::new());
-        let mask = mask.expect("a cut");
-        let count = |rows: std::ops::Range<usize>| {
-            let pixels = 80 * rows.start..80 * rows.end;
-            mask[pixels].iter().filter(|m| **m != 0).count()
-        };
-        assert!(count(0..38) > 1800, "{}", count(0..38));
-        assert!(count(42..50) < 60, "{}", count(42..50));
+        let mask = mask_of(&picture, &region, LeafColour::Green).expect("leaves");
+        let high = mask[..80 * 38].iter().filter(|m| **m != 0).count();
+        let low = mask[80 * 42..80 * 50].iter().filter(|m| **m != 0).count();
+        assert!(high > 1800 && low < 60, "{high} {low}");
     }
 
     #[test]
     fn a_crown_without_the_colour_of_leaves_is_bare() {
         assert_eq!(found([90, 80, 70], LeafColour::Green), [0, 0]);
         assert_eq!(found([60, 120, 40], LeafColour::Red), [0, 0]);
-        let nothing = foliage(
-            &halves([60, 120, 40]),
-            &[0; 80 * 60],
-            LeafColour::Green,
-            &CancelToken::new(),
-        );
-        assert!(nothing.is_some_and(|mask| mask.iter().all(|m| *m == 0)));
+        let nothing = mask_of(&halves([60, 120, 40]), &[0; 80 * 60], LeafColour::Green);
+        assert!(nothing.is_none());
+    }
+    /// Bark as dark and green as leaves in the shade are: with a part of it drawn below the crown it is no leaf.
+    #[test]
+    fn bark_that_is_drawn_is_no_leaf() {
+        let size = Size::new(80, 80);
+        let (mut pixels, mut region, mut is_bark) = (Vec::new(), Vec::new(), Vec::new());
+        for i in 0..size.area() {
+            let [u, v] = [i % 80, i / 80];
+            let noise = (seed_of_part(6, i as u64) % 16) as i64 - 8;
+            let is_trunk = (36..44).contains(&u);
+            let colour = match (is_trunk, (u / 4 + v / 4) % 3) {
+                (true, _) => [44, 58, 36],
+                (_, 0) => [170, 190, 220],
+                (_, 1) => [80, 140, 50],
+                _ => [34, 66, 24],
+            };
+            pixels.extend(colour.map(|c: i64| (c + noise).clamp(0, 255) as u8));
+            region.push(if v < 60 { 255 } else { 0 });
+            is_bark.push(is_trunk);
+        }
+        let picture = Rgb { size, pixels };
+        let crown = InCrown {
+            picture: &picture,
+            region: &region,
+            is_bark: &is_bark,
+        };
+        let found = Foliage::of(crown, LeafColour::Green, &CancelToken::new()).expect("leaves");
+        let [mut bark, mut leaves] = [0, 0];
+        for (i, _) in found.mask.iter().enumerate().filter(|(_, m)| **m != 0) {
+            match is_bark[i] {
+                true => bark += 1,
+                false => leaves += 1,
+            }
+        }
+        assert!(bark < 100 && leaves > 2500, "{bark} {leaves}");
     }
 }

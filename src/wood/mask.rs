@@ -197,9 +197,10 @@ pub fn wood_mask(
         *mask = if is_wood { 255 } else { 0 };
     }
     without_specks(&mut out.mask, large)?;
-    let is_sought = |i: usize| region[i] != 0 || is_trunk[i];
-    for (i, odds) in odds.into_iter().enumerate().filter(|(i, _)| is_sought(*i)) {
-        out.odds[i] = odds;
+    for (i, odds) in odds.into_iter().enumerate() {
+        if region[i] != 0 || is_trunk[i] {
+            out.odds[i] = odds;
+        }
     }
     out.is_leaf = leaves.is_leaf;
     Ok(out)
@@ -297,12 +298,11 @@ impl Clues<'_> {
 /// What it costs that neighbours differ: little where their colours do (Boykov and Jolly 2001).
 /// Nothing links what is beyond the region.
 pub(super) fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PAIRS]> {
-    let apart = |i: usize, next: usize| (colour(&pixels[i]) - colour(&pixels[next])).norm_squared();
     let (mut sum, mut count) = (0.0, 0_usize);
     for i in (0..pixels.len()).filter(|i| region[*i] != 0) {
         let neighbours = (0..PAIRS).filter_map(|pair| neighbour(i, pair, size));
         for next in neighbours.filter(|next| region[*next] != 0) {
-            sum += apart(i, next);
+            sum += apart_squared(&pixels[i], &pixels[next]);
             count += 1;
         }
     }
@@ -314,8 +314,13 @@ pub(super) fn links(pixels: &[Vec3b], region: &[u8], size: Size) -> Vec<[f32; PA
             1.0
         };
         let most = f64::from(LINK) / length;
-        most * (-apart(i, next) / (2.0 * mean)).exp()
+        let apart = apart_squared(&pixels[i], &pixels[next]);
+        most * (-apart / (2.0 * mean)).exp()
     })
+}
+
+fn apart_squared(a: &Vec3b, b: &Vec3b) -> f64 {
+    (colour(a) - colour(b)).norm_squared()
 }
 
 /// The trunk is looked for by its colour over so great a share of the tree's height above the foot.
@@ -329,7 +334,7 @@ const SHADE: f64 = 0.5;
 /// A colour is the trunk's if it is so many times as frequent there as beside it.
 const TRUNK_COLOUR: f64 = 2.0;
 /// Width of a stroke, px.
-const STROKE_PX: i32 = 2;
+pub(super) const STROKE_PX: i32 = 2;
 /// Fewer pixels than this show no colour of bark.
 const LEAST_BARK: usize = 64;
 
@@ -359,12 +364,11 @@ impl Part {
         let foot_px = foot.position_px;
         let height = TRUNK_HEIGHT * f64::from(tree.bottom - tree.top);
         let half_width = foot.half_width_px;
-        let within = |px: f64, most: u32| px.clamp(0.0, f64::from(most)) as u32;
         Self {
-            left: within(foot_px.x - half_width, size.width),
-            top: within(foot_px.y - height, size.height),
-            right: within(foot_px.x + half_width, size.width),
-            bottom: within(foot_px.y, size.height),
+            left: clamped(foot_px.x - half_width, size.width),
+            top: clamped(foot_px.y - height, size.height),
+            right: clamped(foot_px.x + half_width, size.width),
+            bottom: clamped(foot_px.y, size.height),
         }
     }
 
@@ -406,6 +410,11 @@ impl Part {
     }
 }
 
+/// A place along a side of the picture, 0 to `most` px.
+fn clamped(px: f64, most: u32) -> u32 {
+    px.clamp(0.0, f64::from(most)) as u32
+}
+
 /// The picture at the larger size, blue first, as OpenCV has it.
 pub(super) fn enlarged_picture(picture: &Rgb, large: Size) -> opencv::Result<Mat> {
     let mut bgr = Mat::default();
@@ -445,12 +454,19 @@ const PIXEL_BITS: i32 = 4;
 
 /// Which pixels of the mask `wood` the strokes are drawn on.
 pub(super) fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
-    let (rows, cols) = (wood.size.height as i32, wood.size.width as i32);
-    let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
-    let width = STROKE_PX * wood.scale as i32;
+    let mut lines: Vec<Stroke> = Vec::with_capacity(strokes.len());
     for stroke in strokes {
-        let places: Stroke = stroke.iter().map(|at| wood.to_mask(*at)).collect();
-        draw_line(&mut mask, &places, Scalar::all(1.0), width)?;
+        lines.push(stroke.iter().map(|at| wood.to_mask(*at)).collect());
+    }
+    on_lines(&lines, wood.size, STROKE_PX * wood.scale as i32)
+}
+
+/// Which pixels of a picture of this `size` lines of this width (px) are drawn on.
+pub(super) fn on_lines(lines: &[Stroke], size: Size, width_px: i32) -> opencv::Result<Vec<bool>> {
+    let (rows, cols) = (size.height as i32, size.width as i32);
+    let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
+    for line in lines {
+        draw_line(&mut mask, line, Scalar::all(1.0), width_px)?;
     }
     Ok(mask.data_bytes()?.iter().map(|m| *m != 0).collect())
 }
@@ -618,9 +634,9 @@ impl Parts {
         for part in &self.of_pixel {
             area[*part] += 1;
         }
-        let parts = self.of_pixel.iter();
-        let is_small = |part: &usize| *part != Self::OUTSIDE && area[*part] <= most;
-        parts.map(is_small).collect()
+        let mut is_small: Vec<bool> = area.iter().map(|area| *area <= most).collect();
+        is_small[Self::OUTSIDE] = false;
+        self.of_pixel.iter().map(|part| is_small[*part]).collect()
     }
 }
 
@@ -640,9 +656,8 @@ pub(super) fn ridges(
     let disc = get_structuring_element(MORPH_ELLIPSE, CvSize::new(side, side), middle)?;
     // The second of the two steps looks so far beyond the bounds at what the first made.
     let part = bounds.widened(side as u32 / 2, size).as_rect();
-    let ridges = |operation| Ridges::of(&grey, part, operation, &disc, moves, size);
-    let dark = ridges(MORPH_BLACKHAT)?;
-    let bright = ridges(MORPH_TOPHAT)?;
+    let dark = Ridges::of(&grey, part, MORPH_BLACKHAT, &disc, moves, size)?;
+    let bright = Ridges::of(&grey, part, MORPH_TOPHAT, &disc, moves, size)?;
     let ridges = if bright.mean > BRIGHT * dark.mean {
         bright
     } else {

@@ -2,6 +2,7 @@
 //! sect. 2.1), which OpenCV learns from pixels that are known; and such of any number of parts.
 
 use super::colours::{Bin, Colours};
+use super::mask::COLOUR_ODDS;
 use nalgebra::{Matrix3, Vector3};
 use opencv::core::{Mat, Rect, Vec3b};
 use opencv::imgproc::{GC_BGD, GC_FGD, GC_INIT_WITH_MASK, grab_cut};
@@ -23,6 +24,8 @@ const LEAST_DENSITY: f64 = 1e-30;
 
 /// Rounds in which a mixture of any number of parts is learned.
 const ROUNDS: usize = 25;
+/// Rounds in which the groups that it begins at settle.
+const SETTLING_ROUNDS: usize = 10;
 /// A part that fewer colours than this have together is none.
 const LEAST_WEIGHT: f64 = 4.0;
 /// Least deviation of a part, grey levels.
@@ -133,15 +136,18 @@ impl Normal {
 
 impl Mixture {
     /// A mixture of at most `parts` normal distributions of these colours (Dempster, Laird and Rubin
-    /// 1977), begun at groups that are parted across their greatest spread (Orchard and Bouman
-    /// 1991). No chance is in it: nearly the same colours give nearly the same mixture. It has none
+    /// 1977), begun at groups that are parted across their greatest spread (Orchard and Bouman 1991)
+    /// and settled (Lloyd 1982). No chance is in it: nearly the same colours give nearly the same mixture. It has none
     /// where there are fewer colours than parts.
     pub fn learned(colours: &Colours, parts: usize) -> Self {
         let all = colours.count();
         if all < parts as f64 {
             return Self { parts: Vec::new() };
         }
-        let groups = Groups::parted(colours, parts);
+        let mut groups = Groups::parted(colours, parts);
+        for _ in 0..SETTLING_ROUNDS {
+            groups.settle(colours);
+        }
         let sums = groups.sums.iter();
         let mut mixture = Self {
             parts: sums.filter_map(|sum| Normal::of_sum(sum, all)).collect(),
@@ -202,6 +208,34 @@ impl Mixture {
     }
 }
 
+/// How much more likely a colour is in one mixture than in another one.
+pub struct LogRatio {
+    pub first: Mixture,
+    pub second: Mixture,
+}
+
+impl LogRatio {
+    /// The odds that a colour is of the first, as a logarithm.
+    pub fn of(&self, colour: &Vector3<f64>) -> f64 {
+        (self.first.density(colour) / self.second.density(colour)).ln()
+    }
+
+    /// The same within the bounds in which it is believed.
+    pub fn believed(&self, colour: &Vector3<f64>) -> f64 {
+        let most = f64::from(COLOUR_ODDS);
+        self.of(colour).clamp(-most, most)
+    }
+
+    /// The mean odds of colours, without bounds.
+    pub fn mean(&self, colours: &Colours) -> f64 {
+        let odds = colours
+            .bins
+            .iter()
+            .map(|bin| bin.count * self.of(&bin.mean()));
+        odds.sum::<f64>() / colours.count()
+    }
+}
+
 /// Colours in groups.
 struct Groups {
     /// The group of each bin.
@@ -224,6 +258,17 @@ impl Groups {
         groups
     }
 
+    /// Every colour comes to the group whose mean is nearest to it.
+    fn settle(&mut self, colours: &Colours) {
+        let filled = self.sums.iter().filter(|sum| sum.count > 0.0);
+        let means: Vec<Vector3<f64>> = filled.map(Bin::mean).collect();
+        self.sums = vec![Bin::default(); means.len()];
+        for (group, bin) in self.of_bin.iter_mut().zip(&colours.bins) {
+            *group = nearest(&means, &bin.mean());
+            self.sums[*group].add(bin, 1.0);
+        }
+    }
+
     /// Whether one could be parted.
     fn part_widest(&mut self, colours: &Colours) -> bool {
         let spreads = self.sums.iter().map(Spread::of).enumerate();
@@ -232,12 +277,11 @@ impl Groups {
             return false;
         };
         let mean = self.sums[widest].mean();
-        let is_beyond = |bin: &Bin| (bin.mean() - mean).dot(&spread.along) > 0.0;
         let mut sums = [Bin::default(), Bin::default()];
         let new = self.sums.len();
         for (group, bin) in self.of_bin.iter_mut().zip(&colours.bins) {
             if *group == widest {
-                let beyond = is_beyond(bin);
+                let beyond = (bin.mean() - mean).dot(&spread.along) > 0.0;
                 sums[usize::from(beyond)].add(bin, 1.0);
                 *group = if beyond { new } else { widest };
             }
@@ -250,6 +294,18 @@ impl Groups {
         }
         is_parted
     }
+}
+
+/// Which of the means is nearest to a colour.
+fn nearest(means: &[Vector3<f64>], colour: &Vector3<f64>) -> usize {
+    let mut best = (0, f64::INFINITY);
+    for (k, mean) in means.iter().enumerate() {
+        let apart = (mean - colour).norm_squared();
+        if apart < best.1 {
+            best = (k, apart);
+        }
+    }
+    best.0
 }
 
 /// How far the colours of a group are spread along the direction in which they are most.

@@ -7,25 +7,30 @@
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
 //! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
 //! strokes in place of motion; [`foliage`] finds its leaves, and [`contrast`] says whether a stroke is on
-//! anything.
+//! anything, [`crown`] whether it is round a crown. Without strokes a crown in leaf is looked for in
+//! [`greenery`].
 
 mod bark;
 mod circles;
 mod colours;
 mod contrast;
 mod crossings;
+mod crown;
 mod cut;
 mod evidence;
 mod faint;
 mod foliage;
+mod greenery;
 mod mask;
 mod mixture;
 mod paths;
 mod photograph;
 mod probability;
 mod steady;
+mod stroke_colours;
 
 pub use foliage::LeafColour;
+pub use greenery::greenery;
 pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph};
 
 use crate::cancel::CancelToken;

@@ -238,11 +238,9 @@ pub(super) struct Track {
 /// All branches, the farthest tips first. What does not reach above the foot is roots, or lies on
 /// the ground.
 fn tips_first(grid: &Grid, ways: &Ways, foot: usize) -> Vec<Track> {
-    let is_tip = |pixel: &usize| {
-        let is_above = pixel / grid.width() < foot / grid.width();
-        is_above && grid.inside[*pixel] > 0.0 && ways.cost[*pixel].is_finite()
-    };
-    let mut tips: Vec<usize> = (0..grid.cost.len()).filter(is_tip).collect();
+    let above_foot = 0..foot / grid.width() * grid.width();
+    let tips = above_foot.filter(|p| grid.inside[*p] > 0.0 && ways.cost[*p].is_finite());
+    let mut tips: Vec<usize> = tips.collect();
     tips.sort_by(|a, b| ways.cost[*b].total_cmp(&ways.cost[*a]));
     let mut explained = vec![false; grid.cost.len()];
     let mut on_branch = vec![false; grid.cost.len()];

@@ -6,18 +6,17 @@
 //! likely wood, as those of films are; the paper moves a circle over the same pixels, which is the
 //! other choice (`skeleton.trace_by`).
 
-use super::colours::{Colours, colour_at};
-use super::contrast::{self, Around};
+use super::colours::colour_at;
 use super::cut::{SURE, least_cut};
-use super::foliage::{LeafColour, foliage};
-use super::mask::{self, COLOUR_ODDS, Part, Parts, WoodMask};
-use super::mixture::Mixture;
-use super::{Stroke, bark, circles, faint, paths, probability, widened};
+use super::foliage::{Foliage, InCrown, LeafColour};
+use super::mask::{self, Part, WoodMask};
+use super::stroke_colours::StrokeColours;
+use super::{Stroke, bark, circles, crown, faint, paths, probability, widened};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
 use crate::model::{AtRest, BranchGraph, Luma, Masks, Outline, Rgb, Size, Wood};
-use crate::signal::convex_hull;
-use nalgebra::{Point2, Vector3};
+use crate::signal::{convex_hull, median};
+use nalgebra::Point2;
 use opencv::core::{Mat, Point, Scalar, Vec3b, Vector};
 use opencv::imgproc::{LINE_8, fill_convex_poly};
 use opencv::prelude::*;
@@ -29,47 +28,17 @@ const FREEDOM_PX: f64 = 10.0;
 /// picture's width (the radius of the circles of Tan et al. 2008 sect. 2.2, 50 px of 1500).
 const BESIDE_STROKE: f64 = 1.0 / 30.0;
 /// Parts of the mixtures of wood and of all else (Tan et al. 2008 sect. 2.2).
-const PARTS: usize = 5;
-/// Fewer colours than this on the strokes show no bark.
-const LEAST_BARK: f64 = 64.0;
-/// The colours on the strokes are bark if their odds against all else are this at least in their mean, as
-/// a logarithm; elsewhere there is nothing to see.
-const LEAST_TOLD: f64 = 0.5;
+pub const PARTS: usize = 5;
 /// What is added to the odds of a bare tree's pixel on a ridge, and elsewhere; to those of a tree
 /// in leaf; and of its leaves. By the truth of ten made photographs.
 const RIDGE_ODDS: f32 = 1.6;
 const PLAIN_ODDS: f32 = -2.4;
 const LEAFY_ODDS: f32 = -1.0;
 const LEAF_ODDS: f32 = -4.0;
-/// The trunk's stroke is on something if the odds of its own colours are above those at either side by so
-/// many of the difference's standard errors. As the colours are learned from the stroke itself, this is up
-/// to 5.2 on nothing; along trunks of made photographs it is 9.4 or more (seeds 36001 to 36004). It is
-/// doubtful with less, and not refused: the trunk of the shipped clip, 640 px wide and before bushes, has
-/// 3.2.
-const LEAST_TRUNK_DEVIATIONS: f64 = 5.0;
-/// With less than this a trunk is refused. For other strokes the colours are the trunk's, and with less than
-/// this they are doubtful: on nothing it is 0
-/// in the median and 1.6 at most, along twigs that are drawn 2 px off 2.1 at least (the same seeds), but
-/// one of some hundred of fresh seeds had -0.3: they are not refused.
-const LEAST_DEVIATIONS: f64 = 1.0;
-/// Leaves differ from what is around the crown if they do by so many standard errors. Round trees of made
-/// photographs it is 9.0 or more, in a crown of which a fifth is leaves 5.3, on eight lawns 2.4 to 8.1: three
-/// of these pass (even seeds of 36002 to 36008 and 37002 to 37008).
-const LEAST_CROWN_DEVIATIONS: f64 = 4.0;
-/// A crown without leaves holds branches of this length at least, by its own size (the root of its area),
-/// and one in leaf is no farther from the trunk than so much of it.
-const LEAST_WOOD: f64 = 0.5;
-const FARTHEST_CROWN: f64 = 0.25;
-/// Leaves nearer to each other than twice this share of the picture's width are one piece, and pieces
-/// with less than this share of the area of all are none of the tree's.
-const CLUMP_SHARE: f64 = 0.006;
-const SMALL_PIECE: f64 = 0.03;
-/// The odds of a colour are believed up to this, as a logarithm.
-const MOST_ODDS: f64 = COLOUR_ODDS as f64;
-/// How far a hand is off a twig, as a share of the picture's width (4 px of 1500).
-const UNSTEADY: f64 = 4.0 / 1500.0;
-/// A stroke of which less is in sight than this share leads through leaves.
-const IN_SIGHT: f64 = 0.5;
+/// Where the mask is wider than so many times the trunk it is no wood: where limbs part it is up to 1.5. A trunk
+/// has so great a radius at least.
+const THICK: f32 = 2.5;
+const LEAST_TRUNK_PX: f32 = 3.0;
 /// Where so great a share of a piece of a branch is leaves, its width is not seen.
 const HIDDEN: f64 = 0.5;
 
@@ -134,21 +103,35 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     let size = photo.picture.size;
     let trunk = photo.strokes.first().and_then(|trunk| trunk.first());
     let foot_px = trunk.ok_or(NotSeen::Wood)?;
-    let crown = widened(&photo.crown.mask, size, FREEDOM_PX)?;
+    let within = widened(&photo.crown.mask, size, FREEDOM_PX)?;
     let colour = photo.leaf_colour.unwrap_or_default();
-    let leaves = foliage(photo.picture, &crown, colour, cancel);
-    let leaves = without_far_pieces(leaves.ok_or(NotSeen::Cancelled)?, size)?;
+    let is_stroke = mask::on_lines(photo.strokes, size, mask::STROKE_PX)?;
+    let in_crown = InCrown {
+        picture: photo.picture,
+        region: &within,
+        is_bark: &is_stroke,
+    };
+    let foliage = Foliage::of(in_crown, colour, cancel);
+    if cancel.is_cancelled() {
+        return Err(NotSeen::Cancelled);
+    }
+    let mut crown_deviations = None;
+    let leaves = match foliage {
+        Some(foliage) => {
+            crown_deviations = crown::deviations(&photo, &foliage)?;
+            crown::without_far_pieces(foliage.mask, size)?
+        }
+        None => vec![0; size.area()],
+    };
     let in_leaf = leaves.iter().any(|leaf| *leaf != 0);
     if let (Some(colour), false) = (photo.leaf_colour, in_leaf) {
         return Err(NotSeen::LeavesOf(colour));
     }
-    if in_leaf {
-        refuse_like_rest(&photo, &leaves)?;
-    }
-    let region = with_strokes(photo.crown, &crown, photo.strokes)?;
+    crown::refuse_like_rest(crown_deviations)?;
+    let region = with_strokes(photo.crown, &within, photo.strokes)?;
     let empty = without_wood(size, &leaves);
-    let bark_seen = Bark::of(photo, &region, &empty)?;
-    let mask = wood_mask(photo, &region, &bark_seen, empty, cancel)?;
+    let on_strokes = StrokeColours::of(photo, is_stroke, &region, &empty.is_leaf)?;
+    let mask = wood_mask(photo, &region, &on_strokes, empty, cancel)?;
     let traced = match photo.trace_by {
         TraceBy::Paths => paths::branches(&mask, *foot_px)?,
         TraceBy::Circles => circles::branches(&mask, *foot_px)?,
@@ -160,7 +143,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     if branches.nodes.len() < 2 {
         return Err(NotSeen::Wood);
     }
-    refuse_other_crown(photo.crown, &branches, mask.in_leaf)?;
+    crown::refuse_other(photo.crown, &branches, mask.in_leaf)?;
     hide_radii(&mut branches, &leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -185,74 +168,9 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         },
         in_leaf: mask.in_leaf,
         tree,
-        trunk_deviations: bark_seen.trunk_deviations,
-        doubtful: bark_seen.doubtful,
+        trunk_deviations: on_strokes.trunk_deviations,
+        doubtful: on_strokes.doubtful,
     })
-}
-
-/// Refuses leaves that do not differ from what is around the crown: a lawn, or a hedge.
-fn refuse_like_rest(photo: &Photograph, leaves: &[u8]) -> Result<(), NotSeen> {
-    let size = photo.picture.size;
-    let inverse: Vec<u8> = photo.crown.mask.iter().map(|m| 255 - m).collect();
-    let off_px = paths::distances(&inverse, size)?;
-    let around = Around {
-        crown: photo.crown,
-        leaves,
-        off_px: &off_px,
-    };
-    let of_leaves = Mixture::learned(&Colours::of(photo.picture, |i| leaves[i] != 0), PARTS);
-    let of_rest = Colours::of(photo.picture, |i| around.is_beside(i));
-    let of_rest = Mixture::learned(&of_rest, PARTS);
-    let odds = |i: usize| {
-        ln_ratio(&of_leaves, &of_rest, &colour_at(photo.picture, i)).clamp(-MOST_ODDS, MOST_ODDS)
-    };
-    match around.deviations(odds) {
-        Some(deviations) if deviations < LEAST_CROWN_DEVIATIONS => Err(NotSeen::Leaves),
-        _ => Ok(()),
-    }
-}
-
-/// Refuses a crown that is not that of these branches: a bare one in which hardly any of them are, or
-/// one in leaf that is apart from them.
-fn refuse_other_crown(
-    crown: &Outline,
-    branches: &BranchGraph,
-    in_leaf: bool,
-) -> Result<(), NotSeen> {
-    let size = crown.size;
-    let area = crown.mask.iter().filter(|m| **m != 0).count();
-    let side_px = (area as f64).sqrt();
-    if !in_leaf {
-        let within_px = branches.length_within_px(|at| crown.contains(at.x, at.y));
-        return match within_px < LEAST_WOOD * side_px {
-            true => Err(NotSeen::Crown),
-            false => Ok(()),
-        };
-    }
-    let inverse: Vec<u8> = crown.mask.iter().map(|m| 255 - m).collect();
-    let off_px = paths::distances(&inverse, size)?;
-    let places = branches.nodes.iter().filter_map(|node| {
-        let [u, v] = [node.position_px.x, node.position_px.y].map(|c| c.round().max(0.0) as usize);
-        off_px.get(v * size.width as usize + u)
-    });
-    let nearest_px = places.copied().fold(f32::INFINITY, f32::min);
-    match f64::from(nearest_px) > FARTHEST_CROWN * side_px {
-        true => Err(NotSeen::Apart),
-        false => Ok(()),
-    }
-}
-
-/// Leaves without the pieces of a lawn or a bush that lie within the crown stroke: those that are
-/// small and apart from the others.
-fn without_far_pieces(mut leaves: Vec<u8>, size: Size) -> opencv::Result<Vec<u8>> {
-    let joined = widened(&leaves, size, CLUMP_SHARE * f64::from(size.width))?;
-    let n_joined = joined.iter().filter(|m| **m != 0).count();
-    let most = (SMALL_PIECE * n_joined as f64) as usize;
-    let is_small = Parts::of(&joined, size, 8)?.no_larger_than(most);
-    for (leaf, is_small) in leaves.iter_mut().zip(is_small) {
-        *leaf = if is_small { 0 } else { *leaf };
-    }
-    Ok(leaves)
 }
 
 /// The pixels within `region` that are more likely wood than not.
@@ -262,11 +180,11 @@ fn without_far_pieces(mut leaves: Vec<u8>, size: Size) -> opencv::Result<Vec<u8>
 fn wood_mask(
     photo: Photograph,
     region: &[u8],
-    bark: &Bark,
+    on_strokes: &StrokeColours,
     empty: WoodMask,
     cancel: &CancelToken,
 ) -> Result<WoodMask, NotSeen> {
-    let (size, in_leaf, is_stroke) = (photo.picture.size, empty.in_leaf, &bark.is_stroke);
+    let (size, in_leaf, is_stroke) = (photo.picture.size, empty.in_leaf, &on_strokes.is_stroke);
     let mut out = empty;
     let bounds = Part::holding(region, size).ok_or(NotSeen::Wood)?;
     let bgr = mask::enlarged_picture(photo.picture, size)?;
@@ -277,7 +195,7 @@ fn wood_mask(
     };
     let mut odds = vec![0.0; size.area()];
     for i in (0..size.area()).filter(|i| is_inside[*i]) {
-        let by_colour = bark.odds(&colour_at(photo.picture, i)) as f32;
+        let by_colour = on_strokes.odds(&colour_at(photo.picture, i)) as f32;
         let by_place = match (is_ridge.get(i), out.is_leaf[i]) {
             (Some(true), _) => RIDGE_ODDS,
             (Some(false), _) => PLAIN_ODDS,
@@ -302,7 +220,48 @@ fn wood_mask(
         }
     }
     mask::without_specks(&mut out.mask, size)?;
+    without_thick(&mut out.mask, &photo.strokes[0], size)?;
+    for (mask, is_stroke) in out.mask.iter_mut().zip(is_stroke) {
+        *mask = if *is_stroke { 255 } else { *mask };
+    }
     Ok(out)
+}
+
+/// Takes out of a mask of wood what is far thicker than its trunk, as no branch is: a wall that has the
+/// colours of bark.
+fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<()> {
+    let inside_px = paths::distances(mask, size)?;
+    let Some(radius_px) = radius_low_px(trunk, &inside_px, size) else {
+        return Ok(());
+    };
+    let thick_px = THICK * radius_px.max(LEAST_TRUNK_PX);
+    let mut off_core = Vec::with_capacity(mask.len());
+    for inside in &inside_px {
+        off_core.push(if *inside > thick_px { 0 } else { 255 });
+    }
+    if off_core.contains(&0) {
+        let off_core_px = paths::distances(&off_core, size)?;
+        for (mask, off_px) in mask.iter_mut().zip(off_core_px) {
+            *mask = if off_px > thick_px { *mask } else { 0 };
+        }
+    }
+    Ok(())
+}
+
+/// The median of the radius along the lower half of a trunk; `None` where it is not in the picture.
+fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
+    let mut radii = Vec::new();
+    for ends in trunk.windows(2) {
+        let way = ends[1] - ends[0];
+        let count = way.norm().ceil().max(1.0) as usize;
+        for step in 0..count {
+            let at = ends[0] + way * (step as f64 / count as f64);
+            let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
+            radii.extend(inside_px.get(v * size.width as usize + u));
+        }
+    }
+    radii.truncate(radii.len().div_ceil(2));
+    median(radii, f32::total_cmp)
 }
 
 /// A mask without wood.
@@ -318,113 +277,29 @@ fn without_wood(size: Size, leaves: &[u8]) -> WoodMask {
     }
 }
 
-/// What is on the strokes: their pixels, their colours, and all others.
-struct Bark {
-    is_stroke: Vec<bool>,
-    colours: Mixture,
-    others: Mixture,
-    /// By how many standard errors the trunk's stroke differs from what is beside it, where that is in
-    /// sight.
-    trunk_deviations: Option<f64>,
-    /// The other strokes that do not differ from what is beside them.
-    doubtful: Vec<usize>,
-}
-
-impl Bark {
-    /// # Errors
-    /// The strokes show too little bark, or the trunk's is on nothing.
-    fn of(photo: Photograph, region: &[u8], empty: &WoodMask) -> Result<Self, NotSeen> {
-        let is_stroke = mask::drawn(photo.strokes, empty)?;
-        let on_strokes = Colours::of(photo.picture, |i| is_stroke[i] && !empty.is_leaf[i]);
-        if on_strokes.count() < LEAST_BARK {
-            return Err(NotSeen::Wood);
-        }
-        let others = Colours::of(photo.picture, |i| region[i] == 0 || empty.is_leaf[i]);
-        let mut bark = Self {
-            is_stroke,
-            colours: Mixture::learned(&on_strokes, PARTS),
-            others: Mixture::learned(&others, PARTS),
-            trunk_deviations: None,
-            doubtful: Vec::new(),
-        };
-        bark.look_along(photo, &empty.is_leaf)?;
-        match bark.told(&on_strokes) < LEAST_TOLD {
-            true => Err(NotSeen::Wood),
-            false => Ok(bark),
-        }
-    }
-
-    /// The odds that a colour is of bark, as a logarithm within the bounds in which it is believed.
-    fn odds(&self, colour: &Vector3<f64>) -> f64 {
-        ln_ratio(&self.colours, &self.others, colour).clamp(-MOST_ODDS, MOST_ODDS)
-    }
-
-    /// The mean odds of colours, without bounds.
-    fn told(&self, colours: &Colours) -> f64 {
-        let bins = colours.bins.iter();
-        let told = bins.map(|bin| bin.count * ln_ratio(&self.colours, &self.others, &bin.mean()));
-        told.sum::<f64>() / colours.count()
-    }
-
-    /// Holds what is along the strokes against what is beside them.
-    ///
-    /// # Errors
-    /// The trunk's does not differ.
-    fn look_along(&mut self, photo: Photograph, hides: &[bool]) -> Result<(), NotSeen> {
-        let size = photo.picture.size;
-        let mut doubtful = Vec::new();
-        for (number, stroke) in photo.strokes.iter().enumerate() {
-            // A trunk is wider than a hand is unsteady.
-            let off_px = match number {
-                0 => 0.0,
-                _ => UNSTEADY * f64::from(size.width),
-            };
-            let odds = |at: Point2<f64>| Some(self.odds(&photo.picture.interpolated(at)?));
-            let seen = contrast::along(stroke, size, hides, off_px, odds);
-            let is_below = |least: f64| seen.deviations.is_some_and(|found| found < least);
-            if number == 0 && is_below(LEAST_DEVIATIONS) {
-                return Err(NotSeen::Trunk);
-            }
-            let is_doubtful = match number {
-                0 => is_below(LEAST_TRUNK_DEVIATIONS),
-                // One that leaves hide is drawn where it must be.
-                _ => seen.in_sight >= IN_SIGHT && is_below(LEAST_DEVIATIONS),
-            };
-            if number == 0 {
-                self.trunk_deviations = seen.deviations;
-            }
-            doubtful.extend(is_doubtful.then_some(number));
-        }
-        self.doubtful = doubtful;
-        Ok(())
-    }
-}
-
-/// The odds that a colour is of the first mixture, as a logarithm.
-fn ln_ratio(first: &Mixture, second: &Mixture, colour: &Vector3<f64>) -> f64 {
-    (first.density(colour) / second.density(colour)).ln()
-}
-
 /// Sets the radius of pieces that leaves hide to 0: a stroke through leaves is a branch, and is no
 /// measure of its width.
 fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
     let ends: Vec<Point2<f64>> = branches.nodes.iter().map(|n| n.position_px).collect();
     for (node, to) in branches.nodes.iter_mut().zip(&ends) {
-        let Some(from) = node.parent.map(|p| ends[p]) else {
-            continue;
-        };
-        let steps = (to - from).norm().ceil().max(1.0) as usize;
-        let is_hidden = |step: &usize| {
-            let at = from + (to - from) * (*step as f64 / steps as f64);
-            let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
-            let place = v * size.width as usize + u;
-            leaves.get(place).is_some_and(|leaf| *leaf != 0)
-        };
-        let hidden = (1..=steps).filter(is_hidden).count();
-        if hidden as f64 > HIDDEN * steps as f64 {
+        let from = node.parent.map(|p| ends[p]);
+        if from.is_some_and(|from| hidden_share(from, *to, leaves, size) > HIDDEN) {
             node.radius_px = 0.0;
         }
     }
+}
+
+/// The share of a line that leaves hide.
+fn hidden_share(from: Point2<f64>, to: Point2<f64>, leaves: &[u8], size: Size) -> f64 {
+    let steps = (to - from).norm().ceil().max(1.0) as usize;
+    let mut hidden = 0;
+    for step in 1..=steps {
+        let at = from + (to - from) * (step as f64 / steps as f64);
+        let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
+        let place = v * size.width as usize + u;
+        hidden += usize::from(leaves.get(place).is_some_and(|leaf| *leaf != 0));
+    }
+    hidden as f64 / steps as f64
 }
 
 /// The `widened` region of a crown, what is beside the strokes, and what lies between: the convex hull of
@@ -531,6 +406,23 @@ mod tests {
         }
         let n_tree = found.tree.iter().filter(|m| **m != 0).count();
         assert!((2000..3000).contains(&n_tree), "{n_tree}");
+    }
+
+    #[test]
+    fn what_is_far_thicker_than_the_trunk_is_no_wood() {
+        let mut mask = vec![0; SIZE.area()];
+        for (i, pixel) in mask.iter_mut().enumerate() {
+            let at = Point2::new((i % 320) as f64, (i / 320) as f64);
+            let is_trunk = distance_to_segment(at, FOOT, TOP) <= 4.0;
+            let is_wall = (200.0..300.0).contains(&at.x) && (50.0..150.0).contains(&at.y);
+            *pixel = if is_trunk || is_wall { 255 } else { 0 };
+        }
+        without_thick(&mut mask, &vec![FOOT, TOP], SIZE).expect("opencv");
+        let left = mask.iter().enumerate().filter(|(_, m)| **m != 0);
+        let (trunk, wall): (Vec<_>, Vec<_>) = left.partition(|(i, _)| i % 320 < 180);
+        assert!(trunk.len() > 850, "{}", trunk.len());
+        // Corners of the wall are left, which nothing joins to the tree.
+        assert!(wall.len() < 200, "{}", wall.len());
     }
 
     #[test]

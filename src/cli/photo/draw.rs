@@ -73,7 +73,7 @@ fn found(tree: TreeInPhoto) -> FoundTree {
     FoundTree {
         wood: tree.seen.wood,
         in_leaf: tree.seen.in_leaf,
-        agreement: tree.agreement,
+        certainty: tree.found.map(|found| found.chance()),
     }
 }
 

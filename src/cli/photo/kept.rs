@@ -84,8 +84,10 @@ fn as_json(tree: &TreeStrokes, size: Size) -> Value {
 
 /// In hundredths of a pixel.
 fn places(line: &[Point2<f64>]) -> Vec<[f64; 2]> {
-    let hundredths = |at: &Point2<f64>| [at.x, at.y].map(|x| (100.0 * x).round() / 100.0);
-    line.iter().map(hundredths).collect()
+    let places = line.iter();
+    places
+        .map(|at| [at.x, at.y].map(|x| (100.0 * x).round() / 100.0))
+        .collect()
 }
 
 #[cfg(test)]

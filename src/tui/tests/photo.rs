@@ -69,7 +69,7 @@ impl PhotoSession for Puppet {
                 at_rest: Some(Arc::new(AtRest::made_up(SIZE))),
             },
             in_leaf: false,
-            agreement: None,
+            certainty: None,
         }))
     }
 }

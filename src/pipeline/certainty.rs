@@ -1,0 +1,71 @@
+//! How sure it is that a tree is found on which nothing was drawn.
+
+use crate::wood::SeenInPhotograph;
+
+/// A tree with less than this is more likely wrong than right.
+const LEAST_CHANCE: f64 = 0.5;
+/// With this no other attempt is made.
+const SURE_CHANCE: f64 = 0.8;
+/// Weights of a logistic regression: once, by standard errors of the trunk up to so many, and in leaf
+/// (`benches/photos_trust.py fit`, see docs/design/photo.md).
+const ONCE: f64 = -1.31;
+const BY_TRUNK: f64 = 0.48;
+const MOST_DEVIATIONS: f64 = 15.0;
+const IN_LEAF: f64 = -2.68;
+
+/// What a tree that was found without strokes is judged by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certainty {
+    /// By how many standard errors the trunk differs from what is beside it.
+    pub trunk_deviations: f64,
+    pub in_leaf: bool,
+}
+
+impl Certainty {
+    pub fn of(seen: &SeenInPhotograph) -> Self {
+        Self {
+            trunk_deviations: seen.trunk_deviations.unwrap_or(0.0),
+            in_leaf: seen.in_leaf,
+        }
+    }
+
+    /// Whether the tree is more likely right than wrong.
+    pub fn is_likely(&self) -> bool {
+        self.chance() >= LEAST_CHANCE
+    }
+
+    /// Whether it is so likely right that no other is looked for.
+    pub fn is_sure(&self) -> bool {
+        self.chance() >= SURE_CHANCE
+    }
+
+    /// The chance that the tree is right, 0 to 1.
+    pub fn chance(&self) -> f64 {
+        let by_trunk = BY_TRUNK * self.trunk_deviations.clamp(0.0, MOST_DEVIATIONS);
+        let in_leaf = if self.in_leaf { IN_LEAF } else { 0.0 };
+        let score = ONCE + by_trunk + in_leaf;
+        1.0 / (1.0 + (-score).exp())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trunk_that_differs_more_is_surer() {
+        for in_leaf in [false, true] {
+            let mut last = 0.0;
+            for trunk_deviations in [0.0, 5.0, 10.0, 15.0] {
+                let found = Certainty {
+                    trunk_deviations,
+                    in_leaf,
+                };
+                assert!(found.chance() > last, "{found:?}");
+                last = found.chance();
+                assert_eq!(found.is_likely(), last >= 0.5);
+            }
+            assert!((0.8..1.0).contains(&last), "{last}");
+        }
+    }
+}
