@@ -44,7 +44,8 @@ impl Message {
     }
 
     fn head(&mut self, time_ns: u64, frame: &str) {
-        let (message, is_ros2) = (self, self.is_ros2);
+        let is_ros2 = self.is_ros2;
+        let message = self;
         if !is_ros2 {
             message.u32(0);
         }
