@@ -45,7 +45,10 @@ fn scans_of_real_trees_have_their_height_and_girth() {
         let metres = tree.note.config.export.metres_per_px;
         let nodes = &tree.skeleton.nodes;
         let height_m = metres * nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
-        assert!((height_m / scan.height_m - 1.0).abs() < 0.02, "{height_m} m");
+        assert!(
+            (height_m / scan.height_m - 1.0).abs() < 0.02,
+            "{height_m} m"
+        );
         let breast = (1..nodes.len() as u32).map(NodeId).find(|n| {
             let end = &nodes[n.index()];
             let begin = end.parent.map_or(0.0, |p| nodes[p.index()].position.y);
@@ -53,7 +56,10 @@ fn scans_of_real_trees_have_their_height_and_girth() {
             begin <= BREAST_HEIGHT_M && BREAST_HEIGHT_M < end
         });
         let diameter_m = 2.0 * metres * nodes[breast.expect("a trunk").index()].radius;
-        println!("{}: {height_m:.2} m high, {diameter_m:.3} m thick", scan.file);
+        println!(
+            "{}: {height_m:.2} m high, {diameter_m:.3} m thick",
+            scan.file
+        );
         let off = diameter_m / scan.breast_diameter_m - 1.0;
         assert!(off.abs() < 0.1, "{diameter_m} m");
     }

@@ -231,20 +231,32 @@ struct Bridge {
     width: f32,
 }
 
+/// Pieces with so large a share of the points of the largest one wait as it does, until no smaller one
+/// finds a bridge: a search about each of their points takes long.
+const WAITING_SHARE: f64 = 0.1;
+
 /// The bridges that join all pieces which are no farther from another one than `widest`.
 fn bridges(points: &[Point3<f32>], grid: &Grid, pieces: &[u32], widest: f32) -> Vec<Bridge> {
     let mut piece = pieces.to_vec();
+    // What has nothing else so near never will: a search about each of its points takes long.
+    let mut is_alone = vec![false; points.len()];
     let mut all = Vec::new();
+    let mut share = WAITING_SHARE;
     loop {
         let count = piece.iter().max().map_or(0, |m| *m as usize + 1);
         let mut size = vec![0_usize; count];
         piece.iter().for_each(|p| size[*p as usize] += 1);
         // The largest waits for the others to come.
         let largest = (0..count).max_by_key(|p| (size[*p], std::cmp::Reverse(*p)));
+        let most = largest.map_or(0, |l| size[l]) as f64;
+        let mut waits: Vec<bool> = size.iter().map(|n| *n as f64 >= share * most).collect();
+        if let Some(largest) = largest {
+            waits[largest] = true;
+        }
         let mut best: Vec<Option<Bridge>> = vec![None; count];
         for (i, at) in (0..).zip(points) {
             let own = piece[i as usize];
-            if Some(own as usize) == largest {
+            if is_alone[i as usize] || waits[own as usize] {
                 continue;
             }
             let most = best[own as usize].map_or(widest, |b: Bridge| b.width);
@@ -258,9 +270,17 @@ fn bridges(points: &[Point3<f32>], grid: &Grid, pieces: &[u32], widest: f32) -> 
                 });
             }
         }
+        for (alone, own) in is_alone.iter_mut().zip(&piece) {
+            *alone |= best[*own as usize].is_none() && !waits[*own as usize];
+        }
         let mut found: Vec<Bridge> = best.into_iter().flatten().collect();
         if found.is_empty() {
-            return all;
+            if share > 1.0 {
+                return all;
+            }
+            // Now only the largest waits.
+            share = f64::INFINITY;
+            continue;
         }
         found.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.from.cmp(&b.from)));
         let mut joined: Vec<u32> = (0..count as u32).collect();

@@ -48,6 +48,9 @@ const LARGER: f32 = 1.2;
 const MOST_THINNED: usize = 150_000;
 /// To part trees from each other there are so many times as many as there are trees, up to this.
 const FINEST_TREES: usize = 20;
+/// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
+/// each of their points would take long.
+const GAP_OF_STAND_CELLS: f32 = 15.0;
 /// Points are neighbours up to so many cells apart; gaps are led over up to this share of the
 /// tree's height.
 const REACH_CELLS: f32 = 1.8;
@@ -128,7 +131,7 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
     let ground = standing.ground.clone();
-    let coarse = Linked::of(&standing, MOST_THINNED, &mut figures)?;
+    let coarse = Linked::of_tree(&standing, &mut figures)?;
     let trees = coarse.stand(&standing).trees;
     let mut found = CloudTrees {
         trees: Vec::with_capacity(trees),
@@ -146,8 +149,7 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
         return Ok(found);
     }
     drop(coarse);
-    let most = MOST_THINNED * trees.min(FINEST_TREES);
-    let fine = Linked::of(&standing, most, &mut CloudFigures::default())?;
+    let fine = Linked::of_stand(&standing, trees)?;
     let stand = fine.stand(&standing);
     for (point, thinned) in standing.of_cloud.iter().zip(&fine.thinned.of_point) {
         let tree = stand.of_point.get(*thinned as usize);
@@ -168,7 +170,7 @@ fn tree_of_part(standing: &Standing, options: CloudOptions) -> Result<CloudTree,
         points: standing.points.len(),
         ..CloudFigures::default()
     };
-    let linked = Linked::of(standing, MOST_THINNED, &mut figures)?;
+    let linked = Linked::of_tree(standing, &mut figures)?;
     tree_of(standing, linked, options, figures)
 }
 
@@ -180,23 +182,27 @@ struct Linked {
 }
 
 impl Linked {
-    /// The standing points, no more of them than `most`.
-    fn of(
-        standing: &Standing,
-        most: usize,
-        figures: &mut CloudFigures,
-    ) -> Result<Self, CloudError> {
-        let (thinned, cell) = thinned(standing, most, figures)?;
-        let graph = Graph::new(
-            &thinned.points,
-            REACH_CELLS * cell,
-            GAP_SHARE * standing.height,
-        );
-        Ok(Self {
+    /// The standing points as those of one tree.
+    fn of_tree(standing: &Standing, figures: &mut CloudFigures) -> Result<Self, CloudError> {
+        let (thinned, cell) = thinned(standing, MOST_THINNED, figures)?;
+        Ok(Self::of(thinned, cell, GAP_SHARE * standing.height))
+    }
+
+    /// The standing points as those of so many trees.
+    fn of_stand(standing: &Standing, trees: usize) -> Result<Self, CloudError> {
+        let most = MOST_THINNED * trees.min(FINEST_TREES);
+        let (thinned, cell) = thinned(standing, most, &mut CloudFigures::default())?;
+        Ok(Self::of(thinned, cell, GAP_OF_STAND_CELLS * cell))
+    }
+
+    /// Gaps are led over up to `widest`.
+    fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
+        let graph = Graph::new(&thinned.points, REACH_CELLS * cell, widest);
+        Self {
             thinned,
             cell,
             graph,
-        })
+        }
     }
 
     fn stand(&self, standing: &Standing) -> stems::Stand {
@@ -211,9 +217,8 @@ impl Linked {
         figures: &mut CloudFigures,
     ) -> Result<Self, CloudError> {
         take_leaves_off(&mut self, standing, figures)?;
-        let reach = REACH_CELLS * self.cell;
-        self.graph = Graph::new(&self.thinned.points, reach, GAP_SHARE * standing.height);
-        Ok(self)
+        let widest = GAP_SHARE * standing.height;
+        Ok(Self::of(self.thinned, self.cell, widest))
     }
 }
 
