@@ -50,7 +50,7 @@ const MOST_THINNED: usize = 150_000;
 const FINEST_TREES: usize = 20;
 /// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
 /// each of their points would take long.
-const GAP_OF_STAND_CELLS: f32 = 15.0;
+const GAP_OF_STAND_CELLS: f32 = 8.0;
 /// Points are neighbours up to so many cells apart; gaps are led over up to this share of the
 /// tree's height.
 const REACH_CELLS: f32 = 1.8;
@@ -131,7 +131,8 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
     let ground = standing.ground.clone();
-    let coarse = Linked::of_tree(&standing, &mut figures)?;
+    let (few, cell) = thinned(&standing, MOST_THINNED, &mut figures)?;
+    let coarse = Linked::of(few, cell, GAP_OF_STAND_CELLS * cell);
     let trees = coarse.stand(&standing).trees;
     let mut found = CloudTrees {
         trees: Vec::with_capacity(trees),
@@ -143,9 +144,10 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
         for (point, thinned) in standing.of_cloud.iter().zip(&coarse.thinned.of_point) {
             found.tree_of_point[*point as usize] = (*thinned != u32::MAX).then_some(0);
         }
+        let linked = Linked::of(coarse.thinned, cell, GAP_SHARE * standing.height);
         found
             .trees
-            .push(tree_of(&standing, coarse, options, figures));
+            .push(tree_of(&standing, linked, options, figures));
         return Ok(found);
     }
     drop(coarse);
