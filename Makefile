@@ -36,7 +36,8 @@ test-v4l2:
 # A real tree, and a hand before it; fetches 96 MB once.
 test-real:
 	scripts/fetch-real-clip.sh
-	cargo test --release --locked --test real_clip -- --ignored --nocapture
+	scripts/fetch-real-cloud.sh
+	cargo test --release --locked --test real_clip --test real_cloud -- --ignored --nocapture
 
 # ONLY=tracking for the tracker alone, ONLY=animate for the animation.
 bench:

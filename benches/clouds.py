@@ -10,6 +10,12 @@ For each seed: a cloud by made_clouds.py, `arborcam cloud` and `arborcam export 
   surface          share of the tree's points no farther than 1 cm from the surface of the model
   points, s, MB    points of the cloud, time on the processor and largest memory of `arborcam cloud`
 
+With --trees N (2 or more) a cloud is a plot of N trees. Each found tree is taken for the true one that most of its points are of, and gets
+the figures above, and also:
+
+  trees            found, of N
+  right, wrong     share of the points of true trees that are given to the right tree, and to another; the rest is given to none
+
 A cloud that gives no tree is counted and named. Claims are made on seeds that nothing was tuned on. Needs numpy and scipy.
 """
 import argparse, json, os, shutil, subprocess, sys, tempfile
@@ -32,8 +38,10 @@ def main():
     parser.add_argument("--method", default="paths")
     parser.add_argument("--in-leaf", action="store_true", help="clouds with leaves, which arborcam takes off")
     parser.add_argument("--keep", action="store_true", help="keep clouds and trees in the folder --work")
+    parser.add_argument("--trees", type=int, default=1)
     args, of_cloud = parser.parse_known_args()
     of_cloud += ["--leaves"] if args.in_leaf else []
+    of_cloud += ["--trees", str(args.trees)]
     how = ["--method", args.method] + (["--in-leaf"] if args.in_leaf else [])
     work = args.work or Path(tempfile.mkdtemp(prefix="clouds-"))
     rows, failed = [], []
@@ -41,7 +49,7 @@ def main():
         folder = work / str(seed)
         if not (folder / "truth.json").exists():
             subprocess.run([sys.executable, HERE / "made_clouds.py", work, str(seed), str(seed), *of_cloud], check=True)
-        row = run(args.arborcam, folder, how)
+        row = (run if args.trees == 1 else run_plot)(args.arborcam, folder, how)
         if row is None:
             failed.append(seed)
         else:
@@ -56,27 +64,64 @@ def main():
 
 
 def run(arborcam, folder, how):
-    tree, treefile = folder / f"tree-{how[1]}", folder / f"tree-{how[1]}.txt"
-    shutil.rmtree(tree, ignore_errors=True)
-    treefile.unlink(missing_ok=True)
-    child = subprocess.Popen([arborcam, "cloud", folder / "cloud.ply", "--out", tree, *how], stderr=subprocess.PIPE)
+    tree = folder / f"tree-{how[1]}"
+    used = cloud(arborcam, folder, tree, how)
+    if used is None:
+        return None
+    points = read_points(folder / "cloud.ply")
+    row = score(arborcam, tree, json.loads((folder / "truth.json").read_text()), points)
+    return row | dict(points=len(points), **used)
+
+
+def run_plot(arborcam, folder, how):
+    plot = folder / f"plot-{how[1]}"
+    used = cloud(arborcam, folder, plot, [*how, "--points"])
+    if used is None or not (plot / "points.ply").exists():
+        return None
+    truth, points = json.loads((folder / "truth.json").read_text()), read_points(folder / "cloud.ply")
+    true_tree, found = np.load(folder / "tree.npy"), read_trees(plot / "points.ply")
+    is_tree = true_tree >= 0
+    pairs = np.zeros((len(truth["trees"]), found.max() + 1), int)
+    np.add.at(pairs, (true_tree[is_tree], found[is_tree]), 1)
+    taken_for = {k: int(pairs[:, k].argmax()) for k in range(1, found.max() + 1)}
+    right = sum(pairs[true, k] for k, true in taken_for.items() if pairs[true, 1:].argmax() + 1 == k) / is_tree.sum()
+    rows = [score(arborcam, plot / f"tree-{k:04}", truth["trees"][true], points[true_tree == true])
+            for k, true in taken_for.items() if (plot / f"tree-{k:04}").exists()]
+    row = {key: float(np.mean(np.abs([r[key] for r in rows]))) for key in rows[0]}
+    return row | dict(trees=len(taken_for), right=float(right), wrong=float(pairs[:, 1:].sum() / is_tree.sum() - right),
+                      points=len(points), **used)
+
+
+def cloud(arborcam, folder, out, how):
+    """Time and memory of `arborcam cloud`; None where it failed."""
+    shutil.rmtree(out, ignore_errors=True)
+    child = subprocess.Popen([arborcam, "cloud", folder / "cloud.ply", "--out", out, *how], stderr=subprocess.PIPE)
     said = child.stderr.read().decode()
     _, status, used = os.wait4(child.pid, 0)
     if status:
         print(folder.name, said.strip())
         return None
+    return dict(s=used.ru_utime + used.ru_stime, MB=used.ru_maxrss / 1024)
+
+
+def score(arborcam, tree, truth, points):
+    treefile = tree.with_suffix(".txt")
+    treefile.unlink(missing_ok=True)
     subprocess.run([arborcam, "export", tree, "--format", "treefile", "--out", treefile], check=True, stderr=subprocess.DEVNULL)
-    truth = json.loads((folder / "truth.json").read_text())
-    points = read_points(folder / "cloud.ply")
     some = points[np.random.default_rng(0).choice(len(points), min(SCORED_POINTS, len(points)), False)]
-    parent, at, radius = read_treefile(treefile)
-    row = cloud_score.score(truth, some, parent, at, radius)
-    return row | dict(points=len(points), s=used.ru_utime + used.ru_stime, MB=used.ru_maxrss / 1024)
+    return cloud_score.score(truth, some, *read_treefile(treefile))
 
 
 def read_points(path):
     raw = path.read_bytes()
     return np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], "<f8").reshape(-1, 3)
+
+
+def read_trees(path):
+    """The numbers of trees in points.ply."""
+    raw = path.read_bytes()
+    rows = np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], [("at", "<f8", 3), ("tree", "<i4")])
+    return rows["tree"]
 
 
 def read_treefile(path):

@@ -29,7 +29,7 @@
 //! move together · `wood` which pixels are wood · [`skeleton`] in the picture · [`shape`] in space
 //! · [`geometry`] its wood and leaves as meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
 //! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches,
-//! modelled trees and point clouds · [`cloud`] trees in point clouds ·
+//! modelled trees and point clouds · [`cloud`] trees in point clouds · [`calibrate`] a lens by a chessboard ·
 //! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
 //! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
@@ -52,6 +52,7 @@
 
 pub mod animate;
 pub mod bounds;
+pub mod calibrate;
 pub mod cancel;
 pub mod caught;
 #[cfg(feature = "terminal")]

@@ -61,6 +61,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
     // Sketches and modelled trees become flat trees. Readers of scans panic on damaged files.
     ("import", &["model", "signal", "files", "caught"]),
     ("cloud", &["model", "signal"]),
+    ("calibrate", &["model", "signal", "bounds"]),
     // Sub-branches, which only their own frequency tells, and modes.
     (
         "solve",
@@ -142,6 +143,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "files",
             "ffmpeg",
             "document",
+            // A lens as a profile.
+            "calibrate::Calibration",
             "geometry",
             // Cylinders are pieces of limbs.
             "shape::Limb",
@@ -229,6 +232,7 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "export",
             "views",
             "animate",
+            "calibrate",
             "cloud",
             "draw",
             "grow",

@@ -4,11 +4,11 @@
 mod chance;
 mod support;
 
-use arborcam::document::Document;
+use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
 use arborcam::model::{NodeId, NodeKind};
 use chance::Chance;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::BufReader;
@@ -284,17 +284,110 @@ fn units_are_taken_as_given() {
     assert!((4.9..5.1).contains(&height), "{said}");
 }
 
+/// Trees on a slope, not far from each other, each turned and of another size.
+const FEET: [[f64; 2]; 3] = [[0.0, 0.0], [2.6, 0.6], [-0.4, 2.9]];
+const SIZES: [f64; 3] = [1.0, 0.85, 0.7];
+
+/// Their points, and of each the number of its tree; 0 on the ground.
+fn plot(chance: &mut Chance) -> Vec<(Point3<f64>, i32)> {
+    let mut points = Vec::new();
+    for (number, (foot, size)) in (1..).zip(FEET.iter().zip(SIZES)) {
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * f64::from(number));
+        let shift = Vector3::new(foot[0], foot[1], 0.1 * foot[0]) + FAR;
+        let own = points_on(&TUBES, 0.012, 0.003, chance);
+        points.extend(own.iter().map(|p| (turn * (p * size) + shift, number)));
+    }
+    for _ in 0..60_000 {
+        let [x, y] = [chance.between(-3.5, 5.0), chance.between(-3.5, 6.0)];
+        points.push((Point3::new(x, y, 0.1 * x + 0.01 * chance.even()) + FAR, 0));
+    }
+    points
+}
+
+#[test]
+fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [cloud, out, one] = ["plot.xyz", "plot", "one"].map(|name| dir.path().join(name));
+    let truth = plot(&mut Chance::new(7));
+    let points: Vec<Point3<f64>> = truth.iter().map(|t| t.0).collect();
+    write_xyz(&cloud, &points, 1.0);
+    let name = cloud.to_str().expect("name");
+    let said = done(&["cloud", name, "--points"], &out);
+    assert!(said.contains("3 trees;"), "{said}");
+    for tree in ["tree-0001", "tree-0002", "tree-0003", "forest.glb"] {
+        assert!(out.join(tree).exists(), "{tree}: {said}");
+    }
+    // The largest first; heights and places are those of the trees.
+    let forest = ForestDocument::read(&out).expect("a forest");
+    let trees = &forest.forest.trees;
+    assert_eq!(trees.len(), 3);
+    for k in 0..3 {
+        let own = Document::read(&out.join(format!("tree-000{}", k + 1)), 60.0).expect("a tree");
+        let scan = own.note.scan.expect("a scan");
+        let foot = Vector3::from(scan.foot_m) - FAR;
+        assert!(
+            (foot.xy() - Vector2::from(FEET[k])).norm() < 0.08,
+            "{k}: {foot}"
+        );
+        let top = own
+            .skeleton
+            .nodes
+            .iter()
+            .map(|n| n.position.y)
+            .fold(0.0, f64::max);
+        let height_m = top * trees[k].scale * forest.forest.metres_per_px;
+        assert!((height_m - 5.0 * SIZES[k]).abs() < 0.15, "{k}: {height_m}");
+        let apart = trees[k].foot - trees[0].foot;
+        let [x, y] = [0, 1].map(|axis| FEET[k][axis] - FEET[0][axis]);
+        assert!(
+            (apart - Vector3::new(x, 0.1 * x, -y)).norm() < 0.15,
+            "{k}: {apart}"
+        );
+        let on_ground = forest
+            .forest
+            .ground
+            .height_m(Point2::new(trees[k].foot.x, trees[k].foot.z));
+        assert!(
+            (on_ground - trees[k].foot.y).abs() < 0.06,
+            "{k}: {on_ground}"
+        );
+    }
+    // Points of trees are of the right tree.
+    let bytes = fs::read(out.join("points.ply")).expect("points");
+    let rows = &bytes[bytes.len() - 28 * truth.len()..];
+    let (mut right, mut wrong) = (0, 0);
+    for (row, (_, number)) in rows.chunks_exact(28).zip(&truth) {
+        let found = i32::from_le_bytes(row[24..].try_into().expect("four bytes"));
+        right += i32::from(*number > 0 && found == *number);
+        wrong += i32::from(*number > 0 && found != *number && found > 0);
+    }
+    assert!(right > 100 * wrong, "{right}, {wrong}");
+    // One of them.
+    done(&["cloud", name, "--tree", "2"], &one);
+    for file in ["nodes.csv", "tree.glb"] {
+        let [a, b] = [one.join(file), out.join("tree-0002").join(file)];
+        assert_eq!(fs::read(a).expect("file"), fs::read(b).expect("file"));
+    }
+    let film = out.to_str().expect("name");
+    for more in [["--tree", "4"], ["--film", film]] {
+        let none = dir.path().join("none");
+        let output = arborcam(&["cloud", name, more[0], more[1]], &none);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(BAD_USAGE), "{said}");
+        assert!(
+            said.contains(more[0]) && said.lines().count() == 1,
+            "{said}"
+        );
+        assert!(!none.exists());
+    }
+}
+
 /// Each bad cloud gets one line with what is wrong, its status, and nothing is left.
 #[test]
 fn bad_clouds_get_one_line_and_leave_nothing() {
     let dir = tempfile::tempdir().expect("tempdir");
     let chance = &mut Chance::new(1);
     let tree = points_on(&TUBES, 0.02, 0.003, chance);
-    let mut forest = Vec::new();
-    for k in 0..10 {
-        let shift = Vector3::new(4.0 * f64::from(k % 4), 4.0 * f64::from(k / 4), 0.0);
-        forest.extend(tree.iter().map(|p| p + shift));
-    }
     let mut crown: Vec<Point3<f64>> = tree.iter().copied().filter(|p| p.z > 2.8).collect();
     for _ in 0..30_000 {
         crown.push(Point3::new(
@@ -307,7 +400,6 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
         .map(|_| Point3::new(chance.even(), chance.even(), 0.0))
         .collect();
     let path = |name: &str| dir.path().join(name);
-    write_xyz(&path("forest.xyz"), &forest, 1.0);
     write_xyz(&path("crown.xyz"), &crown, 1.0);
     write_xyz(&path("flat.xyz"), &flat, 1.0);
     write_xyz(&path("huge.xyz"), &tree, 0.001);
@@ -324,7 +416,6 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
     .expect("file");
     fs::write(path("tree.mov"), "x").expect("file");
     for (name, status, what) in [
-        ("forest.xyz", FAILED, "10 trees stand in it"),
         ("crown.xyz", FAILED, "does not reach the ground"),
         ("flat.xyz", FAILED, "one plane"),
         ("huge.xyz", FAILED, "--unit"),

@@ -1,36 +1,46 @@
-//! `arborcam cloud FILE --out DIR`: a tree from a point cloud.
+//! `arborcam cloud FILE --out DIR`: a tree from a point cloud, or all of a plot.
+
+mod pairs;
+mod plot;
 
 use super::command_error::CommandError;
 use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
-use crate::cloud::{CloudMethod, CloudOptions, CloudTree, PlacePair, Registration, tree_of_cloud};
+use super::unused;
+use crate::cloud::{
+    CloudError, CloudMethod, CloudOptions, CloudTree, CloudTrees, PlacePair, Registration,
+    trees_of_cloud,
+};
+use crate::config::Config;
 use crate::document::Document;
-use crate::files::{read_bounded, refuse_taken};
-use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, read_cloud};
+use crate::files::refuse_taken;
+use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_cloud};
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
 use crate::views::{DrawnTree, FilmOnScan, register_film, scan_defaults, sway_on_scan};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
+use pairs::{Pairs, read_pairs};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
-/// The first line of `--pairs`, and the largest such table, bytes.
-const PAIR_COLUMNS: &str = "u_px,v_px,x,y,z";
-const LARGEST_PAIRS: u64 = 1_000_000;
+/// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
+/// that.
+const TALL_M: f64 = 60.0;
 /// Radii of twigs that may be given, mm.
 const TWIG_RADII_MM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 #[derive(Debug, Args)]
 pub struct CloudArgs {
-    /// The points of one tree, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc).
+    /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc).
     file: PathBuf,
-    /// Folder for the tree. It must not exist, and appears when it is complete.
+    /// Folder for the tree, or for several trees and their scene. It must not exist, and appears
+    /// when it is complete.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// How the middle lines are found.
@@ -45,6 +55,12 @@ pub struct CloudArgs {
     /// The tree was scanned in leaf: take the leaves off first.
     #[arg(long)]
     in_leaf: bool,
+    /// Of several trees only this one, by its number from 1 on: the one with most points is the first.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    tree: Option<u64>,
+    /// Of several trees, write all points with the numbers of their trees (points.ply).
+    #[arg(long)]
+    points: bool,
     /// A capture of the same tree: its frequencies and damping are put on the scanned branches.
     /// From where it was filmed is found by itself, or by --pairs.
     #[arg(long, value_name = "DIR")]
@@ -122,60 +138,154 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         |e: anyhow::Error| CommandError::Failed(e.context(args.file.display().to_string()));
     let CloudRead {
         cloud,
-        unit_in_file_m,
+        units_in_file,
     } = read(&args.file, args.unit.map(Unit::metres))?;
-    if let (Some(unit_m), None) = (unit_in_file_m, args.unit) {
-        eprint_line(&format!(
-            "arborcam: note: the file's unit is {unit_m:.4} m, as its coordinate system says"
-        ));
-    }
+    print_units(units_in_file);
     let options = CloudOptions {
         method: args.method.into(),
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
         in_leaf: args.in_leaf,
     };
-    let tree = tree_of_cloud(&cloud, options).map_err(|e| of_file(e.into()))?;
-    let scaled = stand_scanned(&tree);
-    let flat = FlatTree {
-        skeleton: scaled.skeleton.clone(),
-        has_radii: true,
-        trunk_px: Vec::new(),
-        crown_px: Vec::new(),
+    let found = trees_of_cloud(&cloud, options).map_err(|e| of_file(e.into()))?;
+    let given = args.unit.map(|unit| Units::all(unit.metres()));
+    let scan = Scan {
+        name: args
+            .file
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned(),
+        units: given.or(units_in_file).unwrap_or(Units::METRES),
+        unit_is_known: given.or(units_in_file).is_some(),
+        cloud,
+        config,
     };
-    let region = outline::covered(&flat.cover_px(), scaled.skeleton.image_size);
-    let region = region.map_err(|e| of_file(e.into()))?;
-    let name = args.file.file_name().unwrap_or_default().to_string_lossy();
-    let document = DrawnTree::scanned(name.into_owned(), &cloud, &tree, scaled, &region, config);
+    let count = found.trees.len() as u64;
+    let number = args.tree.or((count == 1).then_some(1));
+    let Some(number) = number else {
+        args.refuse_film_of_several(count)?;
+        return plot::write(args, &scan, found, stop.while_writing());
+    };
+    if args.points {
+        unused::note("--points", "one tree is written");
+    }
+    let tree = args.chosen(found, number)?;
+    let tree = tree.map_err(|e| of_file(e.into()))?;
+    let drawn = scan.drawn(&tree).map_err(of_file)?;
     if stop.while_writing().load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
-    let branches = document.skeleton.measured_branches().count();
-    let unit_m = args.unit.map(Unit::metres).or(unit_in_file_m);
-    match args.film_on(&tree, &cloud, unit_m.unwrap_or(1.0), &document)? {
+    let branches = drawn.skeleton.measured_branches().count();
+    match args.film_on(&tree, &scan, &drawn)? {
         Some(film) => {
             let (swaying, miss) = (film.branches(), 100.0 * film.registration.miss);
-            document.write_with_film(&args.out, &film)?;
+            drawn.write_with_film(&args.out, &film)?;
             eprint_line(&format!(
                 "the film lies on the scan to {miss:.1} % of its height; {swaying} of {branches} \
                  branches carry its frequencies"
             ));
         }
-        None => drop(document.write(&args.out)?),
+        None => drop(drawn.write(&args.out)?),
     }
     print_summary(&args.out, &tree, branches);
+    scan.warn_of_tall(&tree);
     Ok(())
 }
 
+/// The points that were read, and what trees of them are made with.
+struct Scan {
+    name: String,
+    cloud: PointCloud,
+    /// Of the file.
+    units: Units,
+    unit_is_known: bool,
+    config: Config,
+}
+
+impl Scan {
+    /// A place in the units of the file, m.
+    fn metres(&self, at: &Point3<f64>) -> Point3<f64> {
+        let Units { along_m, up_m } = self.units;
+        Point3::new(along_m * at.x, along_m * at.y, up_m * at.z)
+    }
+
+    /// Warns where the tree is so high that the unit may be another.
+    fn warn_of_tall(&self, tree: &CloudTree) {
+        let height_m = tree.figures.height_m;
+        if height_m > TALL_M && !self.unit_is_known {
+            eprint_line(&format!(
+                "arborcam: warning: few trees are {height_m:.0} m high, and nothing says the unit of the \
+                 file; if it is in feet, give --unit ft or --unit us-ft"
+            ));
+        }
+    }
+
+    /// The tree as a document.
+    fn drawn(&self, tree: &CloudTree) -> anyhow::Result<DrawnTree> {
+        let scaled = stand_scanned(tree);
+        let flat = FlatTree {
+            skeleton: scaled.skeleton.clone(),
+            has_radii: true,
+            trunk_px: Vec::new(),
+            crown_px: Vec::new(),
+        };
+        let region = outline::covered(&flat.cover_px(), scaled.skeleton.image_size)?;
+        let (name, config) = (self.name.clone(), self.config.clone());
+        Ok(DrawnTree::scanned(
+            name,
+            &self.cloud,
+            tree,
+            scaled,
+            &region,
+            config,
+        ))
+    }
+}
+
 impl CloudArgs {
-    /// The film on the scan, if there is one. `unit_m` is the unit of the scan, m.
+    /// The tree with this number, and a word on the others.
+    fn chosen(
+        &self,
+        mut found: CloudTrees,
+        number: u64,
+    ) -> Result<Result<CloudTree, CloudError>, CommandError> {
+        let count = found.trees.len();
+        if number > count as u64 {
+            let trees = if count == 1 {
+                "one tree stands"
+            } else {
+                "trees stand"
+            };
+            return Err(CommandError::BadUsage(anyhow!(
+                "--tree {number}: {count} {trees} in {}; give a number up to {count}",
+                self.file.display()
+            )));
+        }
+        if count > 1 {
+            eprint_line(&format!("arborcam: note: this is tree {number} of {count}"));
+        }
+        Ok(found.trees.swap_remove(number as usize - 1))
+    }
+
+    /// A film is of one tree.
+    fn refuse_film_of_several(&self, count: u64) -> Result<(), CommandError> {
+        if self.film.is_none() {
+            return Ok(());
+        }
+        Err(CommandError::BadUsage(anyhow!(
+            "--film: {count} trees stand in {}; say with --tree which of them was filmed",
+            self.file.display()
+        )))
+    }
+
+    /// The film on the scan, if there is one.
     ///
     /// # Errors
     /// It cannot be read, or does not lie on the scan.
     fn film_on(
         &self,
         tree: &CloudTree,
-        cloud: &PointCloud,
-        unit_m: f64,
+        scan: &Scan,
         document: &DrawnTree,
     ) -> Result<Option<FilmOnScan>, CommandError> {
         let Some(dir) = &self.film else {
@@ -186,10 +296,10 @@ impl CloudArgs {
             .nodes
             .first()
             .map_or(Vector3::zeros(), |n| n.position.coords)
-            + cloud.origin;
+            + scan.cloud.origin;
         let pairs = self.pairs.as_ref().map(|pairs| {
             let against_foot = |p: &PlacePair| PlacePair {
-                scan: p.scan * unit_m - foot,
+                scan: scan.metres(&p.scan) - foot,
                 ..*p
             };
             pairs.0.iter().map(against_foot).collect::<Vec<_>>()
@@ -205,49 +315,6 @@ impl CloudArgs {
         let metres_per_px = document.note.config.export.metres_per_px;
         let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &registration);
         Ok(Some(FilmOnScan { registration, sway }))
-    }
-}
-
-/// The places of `--pairs`, in the unit of the scan.
-#[derive(Clone, Debug)]
-struct Pairs(Vec<PlacePair>);
-
-/// Parses `--pairs`.
-fn read_pairs(path: &str) -> Result<Pairs, String> {
-    let bytes =
-        read_bounded(Path::new(path), LARGEST_PAIRS).map_err(|e| format!("{e}; give a table"))?;
-    let text = String::from_utf8_lossy(&bytes);
-    let mut lines = (1..)
-        .zip(text.lines().map(str::trim))
-        .filter(|(_, line)| !line.is_empty());
-    if lines
-        .next()
-        .is_none_or(|(_, line)| line.replace(' ', "") != PAIR_COLUMNS)
-    {
-        return Err(format!("its first line must be {PAIR_COLUMNS}"));
-    }
-    let mut pairs = Vec::new();
-    for (number, line) in lines {
-        let cells: Option<Vec<f64>> = line
-            .split(',')
-            .map(|cell| cell.trim().parse().ok())
-            .collect();
-        match cells.as_deref() {
-            Some(&[u, v, x, y, z]) if [u, v, x, y, z].iter().all(|n| n.is_finite()) => {
-                pairs.push(PlacePair {
-                    film_px: Point2::new(u, v),
-                    scan: Point3::new(x, y, z),
-                })
-            }
-            _ => return Err(format!("line {number} does not hold five numbers")),
-        }
-    }
-    match pairs.len() {
-        0..3 => Err(format!(
-            "it holds {} pairs, and three are needed",
-            pairs.len()
-        )),
-        _ => Ok(Pairs(pairs)),
     }
 }
 
@@ -269,6 +336,21 @@ fn read(path: &Path, unit_m: Option<f64>) -> Result<CloudRead, CommandError> {
         ImportError::Unreadable { .. } => CommandError::NoInput(anyhow!("{}: {e}", path.display())),
         e => CommandError::Failed(anyhow!("{}: {e}", path.display())),
     })
+}
+
+/// A word on units that the file names, where they are no metres.
+fn print_units(units: Option<Units>) {
+    let Some(units) = units.filter(|u| *u != Units::METRES) else {
+        return;
+    };
+    let Units { along_m, up_m } = units;
+    let heights = match along_m == up_m {
+        true => String::new(),
+        false => format!(", and of its heights {up_m:.4} m"),
+    };
+    eprint_line(&format!(
+        "arborcam: note: the file's unit is {along_m:.4} m{heights}, as its coordinate system says"
+    ));
 }
 
 fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {

@@ -2,6 +2,7 @@
 
 mod analyze;
 mod animate;
+mod calibrate;
 mod camera;
 mod capture;
 mod cloud;
@@ -79,6 +80,8 @@ enum Command {
     Photo(photo::PhotoArgs),
     /// Make a tree from a point cloud (.las, .laz, .e57, .ply, .pcd, .xyz).
     Cloud(cloud::CloudArgs),
+    /// Find the distortion of a lens by a film or pictures of a chessboard, as a profile for `--lens`.
+    Calibrate(calibrate::CalibrateArgs),
     /// Note species, site, wind and the like on a capture, or print what is noted on it.
     Note(note::NoteCommandArgs),
     /// Complete a capture whose run was ended by a crash or a full disk.
@@ -122,6 +125,7 @@ fn run(command: &Command) -> Result<(), CommandError> {
         Command::Sketch(args) => sketch::run(args),
         Command::Photo(args) => photo::run(args),
         Command::Cloud(args) => cloud::run(args),
+        Command::Calibrate(args) => calibrate::run(args),
         Command::Note(args) => note::run(args),
         Command::Finish(args) => finish::run(args),
         Command::Devices(args) => devices::run(args),

@@ -9,8 +9,6 @@ pub enum CloudError {
     Flat,
     #[error("nothing that hangs together stands in it; cut one tree out of the scan")]
     NoTree,
-    #[error("{trees} trees stand in it; cut one of them out of the scan")]
-    SeveralTrees { trees: usize },
     #[error(
         "its tree does not reach the ground: the lowest wood is {gap_m:.1} m above it; scan the trunk, too"
     )]

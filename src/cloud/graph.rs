@@ -33,13 +33,36 @@ pub(super) struct Ways {
 }
 
 impl Ways {
-    /// How many points' ways lead over each point, its own one not counted.
-    pub fn points_above(&self) -> Vec<u32> {
+    /// All points, those with the shortest way first.
+    fn nearest_first(&self) -> Vec<u32> {
         let mut order: Vec<u32> = (0..self.length.len() as u32).collect();
         order
-            .sort_unstable_by(|a, b| self.length[*b as usize].total_cmp(&self.length[*a as usize]));
+            .sort_unstable_by(|a, b| self.length[*a as usize].total_cmp(&self.length[*b as usize]));
+        order
+    }
+
+    /// The point of the foot that a point's way leads to.
+    pub fn first(&self, mut point: u32) -> u32 {
+        while self.before[point as usize] != point {
+            point = self.before[point as usize];
+        }
+        point
+    }
+
+    /// Gives each point that has none (`u32::MAX`) the number of the next on its way.
+    pub fn spread(&self, mut number: Vec<u32>) -> Vec<u32> {
+        for point in self.nearest_first() {
+            if number[point as usize] == u32::MAX {
+                number[point as usize] = number[self.before[point as usize] as usize];
+            }
+        }
+        number
+    }
+
+    /// How many points' ways lead over each point, its own one not counted.
+    pub fn points_above(&self) -> Vec<u32> {
         let mut above = vec![0; self.length.len()];
-        for point in order {
+        for point in self.nearest_first().into_iter().rev() {
             let before = self.before[point as usize];
             if before != point {
                 above[before as usize] += above[point as usize] + 1;
@@ -128,6 +151,20 @@ impl Graph {
         piece
     }
 
+    /// The points of each piece of those that `is_wanted` wants.
+    pub fn members_where(&self, is_wanted: impl Fn(u32) -> bool) -> Vec<Vec<u32>> {
+        let pieces = self.pieces_where(|a, b| is_wanted(a) && is_wanted(b));
+        let count = pieces.iter().max().map_or(0, |p| *p as usize + 1);
+        let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
+        for (point, piece) in (0..).zip(&pieces) {
+            if is_wanted(point) {
+                members[*piece as usize].push(point);
+            }
+        }
+        members.retain(|m| !m.is_empty());
+        members
+    }
+
     /// The shortest ways to the nearest of these points (Dijkstra 1959).
     pub fn shortest_ways(&self, foot: &[u32]) -> Ways {
         let mut ways = Ways {
@@ -194,20 +231,32 @@ struct Bridge {
     width: f32,
 }
 
+/// Pieces with so large a share of the points of the largest one wait as it does, until no smaller one
+/// finds a bridge: a search about each of their points takes long.
+const WAITING_SHARE: f64 = 0.1;
+
 /// The bridges that join all pieces which are no farther from another one than `widest`.
 fn bridges(points: &[Point3<f32>], grid: &Grid, pieces: &[u32], widest: f32) -> Vec<Bridge> {
     let mut piece = pieces.to_vec();
+    // What has nothing else so near never will: a search about each of its points takes long.
+    let mut is_alone = vec![false; points.len()];
     let mut all = Vec::new();
+    let mut share = WAITING_SHARE;
     loop {
         let count = piece.iter().max().map_or(0, |m| *m as usize + 1);
         let mut size = vec![0_usize; count];
         piece.iter().for_each(|p| size[*p as usize] += 1);
         // The largest waits for the others to come.
         let largest = (0..count).max_by_key(|p| (size[*p], std::cmp::Reverse(*p)));
+        let most = largest.map_or(0, |l| size[l]) as f64;
+        let mut waits: Vec<bool> = size.iter().map(|n| *n as f64 >= share * most).collect();
+        if let Some(largest) = largest {
+            waits[largest] = true;
+        }
         let mut best: Vec<Option<Bridge>> = vec![None; count];
         for (i, at) in (0..).zip(points) {
             let own = piece[i as usize];
-            if Some(own as usize) == largest {
+            if is_alone[i as usize] || waits[own as usize] {
                 continue;
             }
             let most = best[own as usize].map_or(widest, |b: Bridge| b.width);
@@ -221,9 +270,17 @@ fn bridges(points: &[Point3<f32>], grid: &Grid, pieces: &[u32], widest: f32) -> 
                 });
             }
         }
+        for (alone, own) in is_alone.iter_mut().zip(&piece) {
+            *alone |= best[*own as usize].is_none() && !waits[*own as usize];
+        }
         let mut found: Vec<Bridge> = best.into_iter().flatten().collect();
         if found.is_empty() {
-            return all;
+            if share > 1.0 {
+                return all;
+            }
+            // Now only the largest waits.
+            share = f64::INFINITY;
+            continue;
         }
         found.sort_by(|a, b| a.width.total_cmp(&b.width).then(a.from.cmp(&b.from)));
         let mut joined: Vec<u32> = (0..count as u32).collect();
@@ -253,6 +310,31 @@ pub(super) fn root(joined: &[u32], mut piece: u32) -> u32 {
         piece = joined[piece as usize];
     }
     piece
+}
+
+/// The number of the group that each place is in, from 0: places nearer than `apart` are of one.
+pub(super) fn groups_within(places: &[Point3<f32>], apart: f32) -> Vec<u32> {
+    let mut joined: Vec<u32> = (0..places.len() as u32).collect();
+    for a in 0..places.len() {
+        for b in 0..a {
+            if (places[a] - places[b]).norm() <= apart {
+                let [low, high] = [root(&joined, a as u32), root(&joined, b as u32)];
+                joined[low.max(high) as usize] = low.min(high);
+            }
+        }
+    }
+    let mut numbers = Vec::with_capacity(places.len());
+    let mut count = 0;
+    for place in 0..places.len() {
+        let first = root(&joined, place as u32) as usize;
+        if first == place {
+            numbers.push(count);
+            count += 1;
+        } else {
+            numbers.push(numbers[first]);
+        }
+    }
+    numbers
 }
 
 /// A point on the way, the nearest first.

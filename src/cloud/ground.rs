@@ -155,8 +155,11 @@ fn lowest_of_cells(points: &[Point3<f32>], cell: f32) -> BTreeMap<Cell, Point3<f
             lowest.truncate(3);
         }
     }
-    let third = |(cell, lowest): (Cell, Vec<Point3<f32>>)| Some((cell, *lowest.get(2)?));
-    three.into_iter().filter_map(third).collect()
+    three.retain(|_, lowest| lowest.len() == 3);
+    three
+        .into_iter()
+        .map(|(cell, lowest)| (cell, lowest[2]))
+        .collect()
 }
 
 /// All cells that are reached from one without a step of more than `step`.
@@ -187,10 +190,13 @@ fn piece_from(
 mod tests {
     use super::*;
 
+    fn slope(x: f32, y: f32) -> f32 {
+        0.2 * x - 0.1 * y
+    }
+
     /// A slope with a stem on it, and the stem alone.
     #[test]
     fn a_stem_on_a_slope_stands_on_ground_and_a_stem_alone_does_not() {
-        let slope = |x: f32, y: f32| 0.2 * x - 0.1 * y;
         let mut points: Vec<Point3<f32>> = Vec::new();
         for i in 0..200 {
             for k in 0..200 {

@@ -158,11 +158,10 @@ fn join_strands(
     top: u32,
     stretch: f64,
 ) {
-    let level = |c: u32| clusters[c as usize].level;
     let [mut a, mut b] = strands.map(|c| root(joined, c));
     let (mut down_a, mut down_b) = (vec![a], vec![b]);
     while a != b {
-        let (down, higher) = if level(a) >= level(b) {
+        let (down, higher) = if level(clusters, a) >= level(clusters, b) {
             (&mut down_a, &mut a)
         } else {
             (&mut down_b, &mut b)
@@ -175,21 +174,32 @@ fn join_strands(
     }
     let parted = &clusters[a as usize];
     let most = LOOP_RADII * parted.extent / stretch;
-    if f64::from(level(top) - parted.level) > most.max(f64::from(LEAST_LOOP)) {
+    if f64::from(level(clusters, top) - parted.level) > most.max(f64::from(LEAST_LOOP)) {
         return;
     }
     let mut of_level: BTreeMap<u32, u32> = BTreeMap::new();
     let mut pairs: Vec<[u32; 2]> = Vec::new();
     for own in down_a.into_iter().chain(down_b) {
-        pairs.extend(of_level.insert(level(own), own).map(|other| [own, other]));
+        pairs.extend(
+            of_level
+                .insert(level(clusters, own), own)
+                .map(|other| [own, other]),
+        );
     }
-    let is_near = |pair: &[u32; 2]| {
-        let [a, b] = pair.map(|c| clusters[c as usize].middle());
-        (a - b).norm() <= APART_RADII * parted.extent
-    };
-    if pairs.iter().all(is_near) {
+    let widest = APART_RADII * parted.extent;
+    if pairs.iter().all(|pair| apart(clusters, pair) <= widest) {
         pairs.iter().for_each(|[a, b]| join(joined, *a, *b));
     }
+}
+
+fn level(clusters: &[Cluster], cluster: u32) -> u32 {
+    clusters[cluster as usize].level
+}
+
+/// The distance between the middles of two clusters.
+fn apart(clusters: &[Cluster], pair: &[u32; 2]) -> f64 {
+    let [a, b] = pair.map(|c| clusters[c as usize].middle());
+    (a - b).norm()
 }
 
 /// A joined cluster, and what it touches.
@@ -283,12 +293,9 @@ fn assemble(clusters: &[Cluster], joined: &[u32], cluster_of: &[u32]) -> RawTree
             at: Point3::from(all[i].middle()),
         });
     }
-    let node = |cluster: &u32| {
-        node_of
-            .get(&root(joined, *cluster))
-            .copied()
-            .unwrap_or(u32::MAX)
-    };
-    tree.of_point = cluster_of.iter().map(node).collect();
+    for cluster in cluster_of {
+        let node = node_of.get(&root(joined, *cluster));
+        tree.of_point.push(node.copied().unwrap_or(u32::MAX));
+    }
     tree
 }

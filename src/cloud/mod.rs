@@ -1,7 +1,7 @@
 //! Point clouds to trees.
 //!
 //! [`tree_of_cloud`] is the whole way: ground and noise off, points thinned, joined to their
-//! neighbours; the foot of the trunk; middle lines by the shortest ways from there ([`levels`]) or
+//! neighbours; several trees parted from each other ([`stems`]); the foot of the trunk; middle lines by the shortest ways from there ([`levels`]) or
 //! by space colonisation ([`colonise`]); branches that hardly stand out pruned; radii by circles
 //! and tapers ([`radius`]).
 
@@ -19,6 +19,7 @@ mod radius;
 mod raw_tree;
 mod refine;
 mod register;
+mod stems;
 mod thin;
 mod tree;
 
@@ -32,6 +33,7 @@ use graph::Graph;
 use ground::Ground;
 use nalgebra::{Point3, Vector3};
 use paths::Path;
+use std::sync::Arc;
 use thin::Thinned;
 
 /// Points that a tree takes at least.
@@ -44,6 +46,11 @@ const OUTERMOST: f64 = 0.001;
 const CELLS_IN_HEIGHT: f32 = 700.0;
 const LARGER: f32 = 1.2;
 const MOST_THINNED: usize = 150_000;
+/// To part trees from each other there are so many times as many as there are trees, up to this.
+const FINEST_TREES: usize = 20;
+/// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
+/// each of their points would take long.
+const GAP_OF_STAND_CELLS: f32 = 8.0;
 /// Points are neighbours up to so many cells apart; gaps are led over up to this share of the
 /// tree's height.
 const REACH_CELLS: f32 = 1.8;
@@ -83,24 +90,162 @@ pub struct CloudOptions {
     pub in_leaf: bool,
 }
 
-/// The tree in a cloud.
+/// The trees in a cloud.
+#[derive(Clone, Debug)]
+pub struct CloudTrees {
+    /// The one with most points first; why there is none where it could not be made.
+    pub trees: Vec<Result<CloudTree, CloudError>>,
+    /// Of each point of the cloud its place in `trees`; `None` for ground, noise and undergrowth.
+    pub tree_of_point: Vec<Option<u32>>,
+    /// Points of the cloud, of ground and of noise.
+    pub figures: CloudFigures,
+    ground: Option<Arc<Ground>>,
+}
+
+impl CloudTrees {
+    /// Height of the ground at a place against the origin of the cloud, m; `None` where no ground was
+    /// scanned.
+    pub fn ground_height_m(&self, x: f64, y: f64) -> Option<f64> {
+        let ground = self.ground.as_ref()?;
+        Some(ground.height_at(x as f32, y as f32).into())
+    }
+}
+
+/// The tree in a cloud; of several the one with most points.
 ///
 /// # Errors
-/// There are too few points, they stand for no tree or for several, or the trunk is missing.
+/// There are too few points, they stand for no tree, or the trunk is missing.
 pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudTree, CloudError> {
+    let mut found = trees_of_cloud(cloud, options)?;
+    found.trees.swap_remove(0)
+}
+
+/// All trees in a cloud, one at least.
+///
+/// # Errors
+/// There are too few points, or they stand for no tree.
+pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudTrees, CloudError> {
     let mut figures = CloudFigures {
         points: cloud.points.len(),
         ..CloudFigures::default()
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
-    let height = standing.height;
-    let (mut thinned, cell) = thinned(&standing, &mut figures)?;
-    if options.in_leaf {
-        take_leaves_off(&mut thinned, &standing, cell, &mut figures)?;
+    let ground = standing.ground.clone();
+    let (few, cell) = thinned(&standing, MOST_THINNED, &mut figures)?;
+    let coarse = Linked::of(few, cell, GAP_OF_STAND_CELLS * cell);
+    let trees = coarse.stand(&standing).trees;
+    let mut found = CloudTrees {
+        trees: Vec::with_capacity(trees),
+        tree_of_point: vec![None; cloud.points.len()],
+        figures,
+        ground,
+    };
+    if trees < 2 {
+        for (point, thinned) in standing.of_cloud.iter().zip(&coarse.thinned.of_point) {
+            found.tree_of_point[*point as usize] = (*thinned != u32::MAX).then_some(0);
+        }
+        let linked = Linked::of(coarse.thinned, cell, GAP_SHARE * standing.height);
+        found
+            .trees
+            .push(tree_of(&standing, linked, options, figures));
+        return Ok(found);
     }
+    drop(coarse);
+    let fine = Linked::of_stand(&standing, trees)?;
+    let stand = fine.stand(&standing);
+    for (point, thinned) in standing.of_cloud.iter().zip(&fine.thinned.of_point) {
+        let tree = stand.of_point.get(*thinned as usize);
+        found.tree_of_point[*point as usize] = tree.copied().filter(|t| *t != stems::OF_NO_TREE);
+    }
+    drop(fine);
+    for own in standing.split(&found.tree_of_point, stand.trees) {
+        found
+            .trees
+            .push(own.and_then(|own| tree_of_part(&own, options)));
+    }
+    Ok(found)
+}
+
+/// The tree of the points that are of one tree.
+fn tree_of_part(standing: &Standing, options: CloudOptions) -> Result<CloudTree, CloudError> {
+    let mut figures = CloudFigures {
+        points: standing.points.len(),
+        ..CloudFigures::default()
+    };
+    let linked = Linked::of_tree(standing, &mut figures)?;
+    tree_of(standing, linked, options, figures)
+}
+
+/// Thinned points without noise, joined to their neighbours.
+struct Linked {
+    thinned: Thinned,
+    cell: f32,
+    graph: Graph,
+}
+
+impl Linked {
+    /// The standing points as those of one tree.
+    fn of_tree(standing: &Standing, figures: &mut CloudFigures) -> Result<Self, CloudError> {
+        let (thinned, cell) = thinned(standing, MOST_THINNED, figures)?;
+        Ok(Self::of(thinned, cell, GAP_SHARE * standing.height))
+    }
+
+    /// The standing points as those of so many trees.
+    fn of_stand(standing: &Standing, trees: usize) -> Result<Self, CloudError> {
+        let most = MOST_THINNED * trees.min(FINEST_TREES);
+        let (thinned, cell) = thinned(standing, most, &mut CloudFigures::default())?;
+        Ok(Self::of(thinned, cell, GAP_OF_STAND_CELLS * cell))
+    }
+
+    /// Gaps are led over up to `widest`.
+    fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
+        let graph = Graph::new(&thinned.points, REACH_CELLS * cell, widest);
+        Self {
+            thinned,
+            cell,
+            graph,
+        }
+    }
+
+    fn stand(&self, standing: &Standing) -> stems::Stand {
+        let above = standing.above_ground(&self.thinned.points);
+        stems::find(&above, &self.graph, standing.height, self.cell)
+    }
+
+    /// The same without the points that are no wood.
+    fn without_leaves(
+        mut self,
+        standing: &Standing,
+        figures: &mut CloudFigures,
+    ) -> Result<Self, CloudError> {
+        take_leaves_off(&mut self, standing, figures)?;
+        let widest = GAP_SHARE * standing.height;
+        Ok(Self::of(self.thinned, self.cell, widest))
+    }
+}
+
+/// The tree that these points stand for.
+fn tree_of(
+    standing: &Standing,
+    mut linked: Linked,
+    options: CloudOptions,
+    mut figures: CloudFigures,
+) -> Result<CloudTree, CloudError> {
+    if options.in_leaf {
+        linked = linked.without_leaves(standing, &mut figures)?;
+    }
+    let Linked {
+        thinned,
+        cell,
+        graph,
+    } = linked;
     let points = &thinned.points;
-    let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * height);
-    let foot = foot::find(&standing.above_ground(points), &graph, height, cell)?;
+    let foot = foot::find(
+        &standing.above_ground(points),
+        &graph,
+        standing.height,
+        cell,
+    )?;
     let ways = graph.shortest_ways(&foot);
     figures.apart = ways.length.iter().filter(|way| way.is_infinite()).count();
     if figures.apart as f64 > MOST_APART * points.len() as f64 {
@@ -154,7 +299,9 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
 /// The points that stand on the ground.
 struct Standing {
     points: Vec<Point3<f32>>,
-    ground: Option<Ground>,
+    /// Of each the place in the cloud.
+    of_cloud: Vec<u32>,
+    ground: Option<Arc<Ground>>,
     height: f32,
 }
 
@@ -174,24 +321,55 @@ impl Standing {
         let is_near = |p: &Point3<f32>| bounds.iter().zip(p.iter()).all(|(b, x)| b.holds(*x));
         let mut points: Vec<Point3<f32>> = all.iter().copied().filter(is_near).collect();
         figures.noise = all.len() - points.len();
-        let ground = Ground::of(&points, height);
+        let ground = Ground::of(&points, height).map(Arc::new);
+        let of_all = (0..).zip(all).filter(|(_, at)| is_near(at));
+        let mut of_cloud: Vec<u32> = of_all.map(|(place, _)| place).collect();
         if let Some(ground) = &ground {
             let before = points.len();
-            points.retain(|p| !ground.holds(p));
+            let stands: Vec<bool> = points.iter().map(|p| !ground.holds(p)).collect();
+            retain_flagged(&mut points, &stands);
+            retain_flagged(&mut of_cloud, &stands);
             figures.ground = before - points.len();
         }
-        if points.len() < LEAST_POINTS {
+        Self {
+            points,
+            of_cloud,
+            ground,
+            height: 0.0,
+        }
+        .measured()
+    }
+
+    /// The same with its height.
+    fn measured(mut self) -> Result<Self, CloudError> {
+        if self.points.len() < LEAST_POINTS {
             return Err(CloudError::NoTree);
         }
-        let height = Extent::of(&points, 2).size;
-        if height <= 0.0 {
+        self.height = Extent::of(&self.points, 2).size;
+        if self.height <= 0.0 {
             return Err(CloudError::Flat);
         }
-        Ok(Self {
-            points,
-            ground,
-            height,
-        })
+        Ok(self)
+    }
+
+    /// The points of each of so many trees; `tree_of_point` goes by the points of the cloud.
+    fn split(self, tree_of_point: &[Option<u32>], trees: usize) -> Vec<Result<Self, CloudError>> {
+        let mut all: Vec<Self> = Vec::with_capacity(trees);
+        for _ in 0..trees {
+            all.push(Self {
+                points: Vec::new(),
+                of_cloud: Vec::new(),
+                ground: self.ground.clone(),
+                height: 0.0,
+            });
+        }
+        for (at, place) in self.points.iter().zip(&self.of_cloud) {
+            if let Some(tree) = tree_of_point[*place as usize] {
+                all[tree as usize].points.push(*at);
+                all[tree as usize].of_cloud.push(*place);
+            }
+        }
+        all.into_iter().map(Self::measured).collect()
     }
 
     /// The points as high as they are above the ground.
@@ -225,6 +403,12 @@ impl Standing {
     }
 }
 
+/// Keeps what is flagged.
+fn retain_flagged<T>(all: &mut Vec<T>, flags: &[bool]) {
+    let mut flags = flags.iter();
+    all.retain(|_| flags.next() == Some(&true));
+}
+
 /// Where most points lie along an axis.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
@@ -251,21 +435,21 @@ impl Extent {
 }
 
 /// The standing points thinned and without noise, and the side of their cells.
-fn thinned(standing: &Standing, figures: &mut CloudFigures) -> Result<(Thinned, f32), CloudError> {
+fn thinned(
+    standing: &Standing,
+    most: usize,
+    figures: &mut CloudFigures,
+) -> Result<(Thinned, f32), CloudError> {
     let mut cell = standing.height / CELLS_IN_HEIGHT;
     let mut thinned = Thinned::of(&standing.points, cell);
-    while thinned.points.len() > MOST_THINNED {
+    while thinned.points.len() > most {
         cell *= LARGER;
         thinned = Thinned::of(&standing.points, cell);
     }
     let cell = cell.max(spacing(&thinned.points, cell));
     let kept = thin::is_no_outlier(&thinned.points, cell);
     thinned.without(&kept);
-    figures.noise += thinned
-        .of_point
-        .iter()
-        .filter(|of| **of == u32::MAX)
-        .count();
+    figures.noise += thinned.of_point.len() - thinned.kept_points();
     figures.cell_m = f64::from(cell);
     let lowest = thinned
         .points
@@ -285,32 +469,22 @@ fn thinned(standing: &Standing, figures: &mut CloudFigures) -> Result<(Thinned, 
 
 /// Takes off the points that are no wood.
 fn take_leaves_off(
-    thinned: &mut Thinned,
+    linked: &mut Linked,
     standing: &Standing,
-    cell: f32,
     figures: &mut CloudFigures,
 ) -> Result<(), CloudError> {
-    let points = &thinned.points;
-    let graph = Graph::new(points, REACH_CELLS * cell, GAP_SHARE * standing.height);
+    let (points, cell) = (&linked.thinned.points, linked.cell);
     let foot = foot::find(
         &standing.above_ground(points),
-        &graph,
+        &linked.graph,
         standing.height,
         cell,
     )?;
-    let is_wood = leaves::is_wood(points, &graph, &graph.shortest_ways(&foot), cell);
-    let before = thinned
-        .of_point
-        .iter()
-        .filter(|of| **of != u32::MAX)
-        .count();
-    thinned.without(&is_wood);
-    let after = thinned
-        .of_point
-        .iter()
-        .filter(|of| **of != u32::MAX)
-        .count();
-    figures.leaves = before - after;
+    let ways = linked.graph.shortest_ways(&foot);
+    let is_wood = leaves::is_wood(points, &linked.graph, &ways, cell);
+    let before = linked.thinned.kept_points();
+    linked.thinned.without(&is_wood);
+    figures.leaves = before - linked.thinned.kept_points();
     Ok(())
 }
 

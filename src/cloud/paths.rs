@@ -70,6 +70,10 @@ impl Place {
             radius: 0.0,
         }
     }
+
+    fn has_circle(&self) -> bool {
+        self.measured.is_some_and(|m| m.is_circle)
+    }
 }
 
 impl Path {
@@ -109,8 +113,7 @@ impl Path {
 
     /// The first place with a circle, if it is near the base; else the base.
     fn first_circle(&self) -> usize {
-        let has_circle = |p: &Place| p.measured.is_some_and(|m| m.is_circle);
-        let first = self.places.iter().position(has_circle).unwrap_or(0);
+        let first = self.places.iter().position(Place::has_circle).unwrap_or(0);
         let way = (self.places[first].at - self.places[0].at).norm();
         if way <= WIDEST_GAP_RADII * radius_near(self, first) {
             first
@@ -125,8 +128,10 @@ impl Path {
         let first = self.first_circle();
         let begin = self.places[first].at;
         let radius = radius_near(self, first);
-        let is_far = |p: &Place| (p.at - begin).norm() > DEPARTURE_RADII * radius;
-        let far = self.places[first..].iter().position(is_far).unwrap_or(0);
+        let free = DEPARTURE_RADII * radius;
+        let mut from_first = self.places[first..].iter();
+        let far = from_first.position(|p| (p.at - begin).norm() > free);
+        let far = far.unwrap_or(0);
         let last = first + far.max(DEPARTURE_PLACES - 1);
         (begin, self.places[last.min(self.places.len() - 1)].at)
     }
@@ -264,35 +269,69 @@ pub(super) fn smooth(paths: &mut [Path]) {
 }
 
 /// Lets every side path leave where its own line meets that of its parent: the level sets of a fork
-/// part only where the barks do. Up to there the parent is led straight if `is_first`.
-pub(super) fn set_joints(paths: &mut [Path], is_first: bool) {
+/// part only where the barks do.
+pub(super) fn set_joints(paths: &mut [Path]) {
     for i in 0..paths.len() {
-        let Some(on) = paths[i].on else {
-            continue;
-        };
-        let own = &paths[i];
-        let (begin, end) = own.first_stretch();
-        let Some(along) = (end - begin).try_normalize(1e-9) else {
-            continue;
-        };
-        let parent = &paths[on.path];
-        let joint = parent.places[on.place].at;
-        // Not farther back than the bark is away, some times.
-        let most = FARTHEST_BACK * (begin - joint).norm();
-        let near =
-            (0..parent.places.len()).filter(|k| (parent.places[*k].at - joint).norm() <= most);
-        let off = |k: usize| {
-            let way = parent.places[k].at - begin;
-            // Behind the first place, as the line goes on backwards.
-            let back = way.dot(&along).min(0.0);
-            (way - along * back).norm() - UNSURE_DIRECTION * back
-        };
-        let best = near.min_by(|a, b| off(*a).total_cmp(&off(*b)));
-        let place = best.unwrap_or(on.place);
-        paths[i].on = Some(Joint { place, ..on });
-        if is_first {
-            paths[on.path].straighten(place, on.place + 1);
+        set_joint(paths, i);
+    }
+}
+
+/// The same, and leads the parents straight from there to where barks part.
+pub(super) fn set_joints_and_straighten(paths: &mut [Path]) {
+    for i in 0..paths.len() {
+        if let Some(moved) = set_joint(paths, i) {
+            paths[moved.path].straighten(moved.to_place, moved.from_place + 1);
         }
+    }
+}
+
+/// By which a joint was moved along the path that it is on.
+struct MovedJoint {
+    path: usize,
+    from_place: usize,
+    to_place: usize,
+}
+
+/// Moves the joint of one path; `None` for the trunk, and what has no direction.
+fn set_joint(paths: &mut [Path], own: usize) -> Option<MovedJoint> {
+    let on = paths[own].on?;
+    let (begin, end) = paths[own].first_stretch();
+    let departure = Departure {
+        begin,
+        along: (end - begin).try_normalize(1e-9)?,
+    };
+    let parent = &paths[on.path];
+    let joint = parent.places[on.place].at;
+    // Not farther back than the bark is away, some times.
+    let most = FARTHEST_BACK * (begin - joint).norm();
+    let near = (0..parent.places.len()).filter(|k| (parent.places[*k].at - joint).norm() <= most);
+    let best = near.min_by(|a, b| {
+        let [a, b] = [a, b].map(|k| departure.off(&parent.places[*k].at));
+        a.total_cmp(&b)
+    });
+    let place = best.unwrap_or(on.place);
+    paths[own].on = Some(Joint { place, ..on });
+    Some(MovedJoint {
+        path: on.path,
+        from_place: on.place,
+        to_place: place,
+    })
+}
+
+/// The line by which a side path leaves.
+struct Departure {
+    begin: Point3<f64>,
+    /// Of length 1.
+    along: Vector3<f64>,
+}
+
+impl Departure {
+    /// How badly a place fits as its joint, m.
+    fn off(&self, at: &Point3<f64>) -> f64 {
+        let way = at - self.begin;
+        // Behind the first place, as the line goes on backwards.
+        let back = way.dot(&self.along).min(0.0);
+        (way - self.along * back).norm() - UNSURE_DIRECTION * back
     }
 }
 

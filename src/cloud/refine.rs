@@ -32,7 +32,11 @@ pub(super) fn refine(
     twig: f64,
 ) {
     for round in 0..ROUNDS {
-        paths::set_joints(paths, round == 0);
+        if round == 0 {
+            paths::set_joints_and_straighten(paths);
+        } else {
+            paths::set_joints(paths);
+        }
         paths::lead_from_bark(paths, stretch);
         radius::assign(paths, twig);
         share_points(paths, points, cell);
@@ -41,7 +45,7 @@ pub(super) fn refine(
         paths::bridge_gaps(paths);
         paths::smooth(paths);
     }
-    paths::set_joints(paths, false);
+    paths::set_joints(paths);
     paths::lead_from_bark(paths, stretch);
 }
 
@@ -197,10 +201,9 @@ mod tests {
         ];
         let mut cloud = PointCloud::default();
         for (own, other) in [(0, 1), (1, 0)] {
-            let is_seen = |at: &Point3<f64>| limbs[other].off(at) > 0.0;
-            for at in limbs[own].bark().into_iter().filter(is_seen) {
-                cloud.push(at);
-            }
+            let mut bark = limbs[own].bark();
+            bark.retain(|at| limbs[other].off(at) > 0.0);
+            bark.into_iter().for_each(|at| assert!(cloud.push(at)));
         }
         let tree = tree_of_cloud(&cloud, CloudOptions::default()).expect("a tree");
         let points = cloud.points.iter().map(|p| p.cast::<f64>());

@@ -136,10 +136,8 @@ pub fn by_pairs(pairs: &[PlacePair], height_px: f64) -> Option<Registration> {
 /// The similarity of least squares; `None` where all lie in one place.
 fn least_squares(pairs: &[Pair]) -> Option<Similarity2<f64>> {
     let count = pairs.len() as f64;
-    let mean = |side: fn(&Pair) -> Point2<f64>| {
-        pairs.iter().map(|p| side(p).coords).sum::<Vector2<f64>>() / count
-    };
-    let (from, to) = (mean(|p| p.from_px), mean(|p| p.to_px));
+    let from = pairs.iter().map(|p| p.from_px.coords).sum::<Vector2<f64>>() / count;
+    let to = pairs.iter().map(|p| p.to_px.coords).sum::<Vector2<f64>>() / count;
     let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
     for pair in pairs {
         let (a, b) = (pair.from_px.coords - from, pair.to_px.coords - to);

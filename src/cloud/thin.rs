@@ -45,6 +45,11 @@ impl Thinned {
         thinned
     }
 
+    /// How many of the points that were thinned are in one that is kept.
+    pub fn kept_points(&self) -> usize {
+        self.of_point.iter().filter(|of| **of != u32::MAX).count()
+    }
+
     /// The same without the points that are not `kept`; what was in them is of no point,
     /// `u32::MAX`.
     pub fn without(&mut self, kept: &[bool]) {

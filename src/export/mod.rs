@@ -16,6 +16,7 @@ mod gltf_model;
 pub mod html;
 mod html_data;
 mod joints;
+pub mod lens_profile;
 mod motion_modes;
 pub mod picture;
 pub mod qsm;

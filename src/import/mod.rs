@@ -34,7 +34,7 @@ mod svg_place;
 mod traced;
 mod treefile;
 
-pub use cloud::{CloudFormat, CloudRead, read_cloud};
+pub use cloud::{CloudFormat, CloudRead, Units, read_cloud};
 pub use error::ImportError;
 pub use flat_tree::FlatTree;
 pub use flatten::FlatModel;

@@ -15,6 +15,7 @@ mod photo;
 mod photo_forest;
 mod prepared;
 mod scan_film;
+mod scan_forest;
 mod scanned;
 mod studio;
 mod tables;
@@ -37,6 +38,7 @@ pub use photo::{
 pub use photo_forest::{StandingPlaces, photo_forest};
 pub use prepared::{PreparedTree, TreeOptions};
 pub use scan_film::{register_film, sway_on_scan};
+pub use scan_forest::{StandingTree, scan_forest};
 pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use tables::TablesWritten;

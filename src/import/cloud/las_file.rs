@@ -1,5 +1,6 @@
 //! LAS and LAZ.
 
+use super::las_units::units_of;
 use super::{Points, refuse_many};
 use crate::caught::caught;
 use crate::import::error::ImportError;
@@ -16,13 +17,6 @@ const EVLR_AT: usize = 235;
 const HEADER_1_4: usize = 375;
 const EVLR_HEAD: u64 = 60;
 const EVLR_LENGTH_AT: u64 = 20;
-/// Records on the coordinate system, and the keys and values of units in them (GeoTIFF
-/// 1.0 sect. 6.3.1.3).
-const GEO_KEYS: u16 = 34735;
-const WKT: u16 = 2112;
-const LINEAR_UNITS: u16 = 3076;
-const FOOT_M: f64 = 0.3048;
-const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
 /// Reads all points. What the header says of their extent is not looked at: it is often wrong.
 ///
@@ -36,7 +30,7 @@ where
     // The decompressor panics on some damaged files.
     let read = caught(move || {
         let mut own = Points {
-            unit_m: points.unit_m,
+            units: points.units,
             unit_is_given: points.unit_is_given,
             read: Default::default(),
         };
@@ -76,7 +70,7 @@ fn check_extended_records(input: &mut (impl Read + Seek)) -> std::io::Result<u64
 }
 
 /// The number in bytes, the lowest first.
-fn number(bytes: &[u8]) -> u64 {
+pub(super) fn number(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .rev()
@@ -97,8 +91,13 @@ where
         )));
     }
     let records = reader.header().all_vlrs();
-    if let Some(unit_m) = records.filter_map(|r| unit_of(r.record_id, &r.data)).next() {
-        points.take_unit(unit_m);
+    if !points.unit_is_given {
+        for record in records {
+            if let Some(units) = units_of(record.record_id, &record.data)? {
+                points.take_units(units);
+                break;
+            }
+        }
     }
     let mut read = 0;
     while read < said {
@@ -125,58 +124,5 @@ fn damaged(e: las::Error) -> ImportError {
     match &e {
         las::Error::Io(io) => ImportError::unreadable(io),
         _ => ImportError::bad_format(e),
-    }
-}
-
-/// The length of the unit of horizontal coordinates that a record names, m, if it is no metre.
-fn unit_of(record: u16, data: &[u8]) -> Option<f64> {
-    match record {
-        GEO_KEYS => {
-            let numbers: Vec<u64> = data.chunks_exact(2).map(number).collect();
-            let key = numbers
-                .get(4..)?
-                .chunks_exact(4)
-                .find(|key| key[0] == u64::from(LINEAR_UNITS))?;
-            match key[3] {
-                9002 => Some(FOOT_M),
-                9003 => Some(US_FOOT_M),
-                _ => None,
-            }
-        }
-        WKT => {
-            let text = String::from_utf8_lossy(data).to_lowercase();
-            let names = [
-                "unit[\"us survey foot",
-                "unit[\"us survey feet",
-                "unit[\"foot_us",
-            ];
-            if names.iter().any(|name| text.contains(name)) {
-                Some(US_FOOT_M)
-            } else {
-                text.contains("unit[\"foot").then_some(FOOT_M)
-            }
-        }
-        _ => None,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn units_are_read_from_keys_and_text() {
-        let keys: Vec<u8> = [1, 1, 0, 1, LINEAR_UNITS, 0, 1, 9003]
-            .iter()
-            .flat_map(|n: &u16| n.to_le_bytes())
-            .collect();
-        assert_eq!(unit_of(GEO_KEYS, &keys), Some(US_FOOT_M));
-        assert_eq!(
-            unit_of(WKT, b"PROJCS[\"x\",UNIT[\"foot\",0.3048]]"),
-            Some(FOOT_M)
-        );
-        assert_eq!(unit_of(WKT, b"PROJCS[\"x\",UNIT[\"metre\",1]]"), None);
-        assert_eq!(unit_of(7, &keys), None);
-        assert_eq!(unit_of(GEO_KEYS, &keys[..5]), None);
     }
 }

@@ -2,6 +2,7 @@
 
 mod e57_file;
 mod las_file;
+mod las_units;
 mod lzf;
 mod pcd;
 mod ply_points;
@@ -50,8 +51,29 @@ impl CloudFormat {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CloudRead {
     pub cloud: PointCloud,
-    /// The unit that the file's own coordinate system names, m; used where none was given.
-    pub unit_in_file_m: Option<f64>,
+    /// The units that the file's own coordinate system names; looked for where none was given.
+    pub units_in_file: Option<Units>,
+}
+
+/// The units of coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// Of x and y, m.
+    pub along_m: f64,
+    /// Of z, m.
+    pub up_m: f64,
+}
+
+impl Units {
+    pub const METRES: Self = Self::all(1.0);
+
+    /// The same for all coordinates, m.
+    pub const fn all(unit_m: f64) -> Self {
+        Self {
+            along_m: unit_m,
+            up_m: unit_m,
+        }
+    }
 }
 
 /// Reads the points of a file, z up. `unit_m` is the length of its unit, m; where it is not given
@@ -69,7 +91,7 @@ where
     R: BufRead + Seek + Send + Sync + 'static,
 {
     let mut points = Points {
-        unit_m: unit_m.unwrap_or(1.0),
+        units: Units::all(unit_m.unwrap_or(1.0)),
         read: CloudRead::default(),
         unit_is_given: unit_m.is_some(),
     };
@@ -91,23 +113,22 @@ where
 
 /// The points while they are read.
 struct Points {
-    unit_m: f64,
+    units: Units,
     unit_is_given: bool,
     read: CloudRead,
 }
 
 impl Points {
-    /// Takes the unit that the file names, m.
-    fn take_unit(&mut self, unit_m: f64) {
-        self.read.unit_in_file_m = Some(unit_m);
-        if !self.unit_is_given {
-            self.unit_m = unit_m;
-        }
+    /// Takes the units that the file names.
+    fn take_units(&mut self, units: Units) {
+        self.read.units_in_file = Some(units);
+        self.units = units;
     }
 
     /// Takes a point in the unit of the file.
     fn push(&mut self, x: f64, y: f64, z: f64) -> Result<(), ImportError> {
-        let at = Point3::new(x, y, z) * self.unit_m;
+        let Units { along_m, up_m } = self.units;
+        let at = Point3::new(along_m * x, along_m * y, up_m * z);
         if self.read.cloud.push(at) {
             Ok(())
         } else {

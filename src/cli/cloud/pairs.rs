@@ -1,0 +1,53 @@
+//! The table of `--pairs`: places that are the same in film and scan.
+
+use crate::cloud::PlacePair;
+use crate::files::read_bounded;
+use nalgebra::{Point2, Point3};
+use std::path::Path;
+
+/// The first line of the table, and the largest, bytes.
+const PAIR_COLUMNS: &str = "u_px,v_px,x,y,z";
+const LARGEST_PAIRS: u64 = 1_000_000;
+
+/// The places of `--pairs`, in the unit of the scan.
+#[derive(Clone, Debug)]
+pub struct Pairs(pub Vec<PlacePair>);
+
+/// Parses `--pairs`.
+pub fn read_pairs(path: &str) -> Result<Pairs, String> {
+    let bytes =
+        read_bounded(Path::new(path), LARGEST_PAIRS).map_err(|e| format!("{e}; give a table"))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let mut lines = (1..)
+        .zip(text.lines().map(str::trim))
+        .filter(|(_, line)| !line.is_empty());
+    if lines
+        .next()
+        .is_none_or(|(_, line)| line.replace(' ', "") != PAIR_COLUMNS)
+    {
+        return Err(format!("its first line must be {PAIR_COLUMNS}"));
+    }
+    let mut pairs = Vec::new();
+    for (number, line) in lines {
+        let cells: Option<Vec<f64>> = line
+            .split(',')
+            .map(|cell| cell.trim().parse().ok())
+            .collect();
+        match cells.as_deref() {
+            Some(&[u, v, x, y, z]) if [u, v, x, y, z].iter().all(|n| n.is_finite()) => {
+                pairs.push(PlacePair {
+                    film_px: Point2::new(u, v),
+                    scan: Point3::new(x, y, z),
+                })
+            }
+            _ => return Err(format!("line {number} does not hold five numbers")),
+        }
+    }
+    match pairs.len() {
+        0..3 => Err(format!(
+            "it holds {} pairs, and three are needed",
+            pairs.len()
+        )),
+        _ => Ok(Pairs(pairs)),
+    }
+}
