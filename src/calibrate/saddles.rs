@@ -158,7 +158,7 @@ impl Surface {
             let moved = (to_x - peak.x as f64)
                 .abs()
                 .max((to_y - peak.y as f64).abs());
-            if !(moved <= reach as f64) || !self.holds(to_x, to_y, reach) {
+            if moved.is_nan() || moved > reach as f64 || !self.holds(to_x, to_y, reach) {
                 return None;
             }
             (x, y) = (to_x as usize, to_y as usize);
