@@ -145,7 +145,7 @@ fn no_camera_file_and_no_list_brings_the_readers_down() {
             assert!(rig.err().is_none_or(|what| !what.contains('\n')));
         });
     }
-    assert!(cameras > 100, "hardly any was ever read: {cameras}");
+    assert!(cameras > 10, "hardly any was ever read: {cameras}");
     let folder = tempfile::tempdir().expect("folder");
     for seed in seeds("list") {
         each(&seed, |bytes| {

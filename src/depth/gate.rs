@@ -12,25 +12,44 @@ const LEAST: usize = 5;
 /// distance a tree that fills the picture is about as deep in all.
 const FARTHEST_SHARE: f64 = 0.25;
 
+/// A point that has not been seen for so many frames is forgotten: a minute or two, so that a marker that
+/// is found again is held to what it was, and memory does not grow.
+const MOST_FRAMES_LOST: u64 = 3600;
+
 /// Leaves out depths that cannot be those of a point: a marker or a point that was lost to what is
-/// behind the tree, or before it, has no depth there. A marker that was lost and is found again is held
-/// to what it was: some hundred bytes are kept of each point.
+/// behind the tree, or before it, has no depth there.
 #[derive(Clone, Debug, Default)]
 pub struct DepthGate {
-    first_m: BTreeMap<TrackId, Vec<f64>>,
+    /// Frames so far.
+    frame: u64,
+    points: BTreeMap<TrackId, Usual>,
+}
+
+/// What a point's depth usually is.
+#[derive(Clone, Debug, Default)]
+struct Usual {
+    first_m: Vec<f64>,
+    last_frame: u64,
 }
 
 impl DepthGate {
     /// Takes the depths away that are not those of their points.
     pub fn step(&mut self, observations: &mut [Observation]) {
+        self.frame += 1;
         for o in observations {
             o.depth = o.depth.filter(|depth| self.is_of(o.id, depth));
+        }
+        if self.frame.is_multiple_of(MOST_FRAMES_LOST) {
+            let first_kept = self.frame - MOST_FRAMES_LOST;
+            self.points.retain(|_, usual| usual.last_frame > first_kept);
         }
     }
 
     fn is_of(&mut self, id: TrackId, depth: &DepthSeen) -> bool {
         let depth_m = f64::from(depth.depth_m);
-        let first_m = self.first_m.entry(id).or_default();
+        let usual = self.points.entry(id).or_default();
+        usual.last_frame = self.frame;
+        let first_m = &mut usual.first_m;
         if first_m.len() >= LEAST {
             let usual_m = median(first_m.clone(), f64::total_cmp).unwrap_or(depth_m);
             if (depth_m - usual_m).abs() > FARTHEST_SHARE * usual_m {
@@ -86,5 +105,14 @@ mod tests {
         }
         let missing: Vec<usize> = (0..60).filter(|k| !kept[*k]).collect();
         assert_eq!(missing, (30..50).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn points_that_are_gone_are_forgotten() {
+        let mut gate = DepthGate::default();
+        for id in 0..3 * MOST_FRAMES_LOST {
+            gate.step(&mut [seen(id as u32, 2.0)]);
+        }
+        assert!(gate.points.len() as u64 <= MOST_FRAMES_LOST);
     }
 }

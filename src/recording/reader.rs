@@ -341,14 +341,14 @@ impl<R: Read + Seek> Reader<R> {
         }
         let foreign = &self.foreign_depth;
         let (from, to) = (foreign.topic.as_deref()?, self.chosen.as_deref()?);
-        let by_topics = foreign.transforms.between_topics(from, to);
-        let colour_from_depth = by_topics.or_else(|| {
-            let (from, to) = (
-                foreign.depth_frame.as_ref()?,
-                foreign.picture_frame.as_ref()?,
-            );
-            foreign.transforms.between_frames(from, to)
-        })?;
+        let colour_from_depth = if is_of_realsense(from) {
+            // Its frames of reference have numbers that do not place them.
+            foreign.transforms.between_topics(from, to)?
+        } else {
+            let frames = foreign.depth_frame.as_ref();
+            let (from, to) = frames.zip(foreign.picture_frame.as_ref())?;
+            foreign.transforms.between_frames(from, to)?
+        };
         Some(DepthRig {
             depth: self.own_depth_camera()?,
             colour: self.picture_camera()?,
