@@ -100,7 +100,7 @@ mod tests {
             deep,
         } = Spread::of(&before);
         let factor = 0.3 * (across * height).sqrt() / deep;
-        assert!((0.4..0.9).contains(&factor), "{factor}");
+        assert!((1.0..MOST_STRETCHED).contains(&factor), "{factor}");
         set_depth_share(&mut tree, 0.3);
         for (node, own) in tree.nodes.iter().zip(&before.nodes) {
             assert_eq!(node.position.xy(), own.position.xy());
