@@ -338,13 +338,6 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if tree.seen.is_crown_doubtful {
-        warnings.push(
-            "the leaves within the crown stroke hardly differ from what is around it, as on a lawn or beside \
-             a tree of the same kind; look whether the stroke is round the crown"
-                .to_owned(),
-        );
-    }
     for index in &tree.seen.doubtful {
         warnings.push(format!(
             "along stroke {} hardly anything is seen that differs from what is at both its sides: it is a \

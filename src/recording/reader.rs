@@ -306,7 +306,7 @@ impl<R: Read + Seek> Reader<R> {
         if own.is_valid() {
             return Some(own);
         }
-        let camera = match self.is_depth_elsewhere() {
+        let camera = match self.depth_misfit().is_some() {
             true => self.picture_camera(),
             false => self.own_depth_camera().or(self.picture_camera()),
         };
@@ -327,18 +327,10 @@ impl<R: Read + Seek> Reader<R> {
         self.foreign_depth.cameras.get(&camera).copied()
     }
 
-    /// Whether the depth is not registered with the pictures, as far as is known by now.
-    fn is_depth_elsewhere(&self) -> bool {
-        let topic = self.foreign_depth.topic.as_deref().unwrap_or_default();
-        is_of_realsense(topic) && !is_registered(topic) || self.depth_misfit().is_some()
-    }
-
     /// The cameras of depth and of pictures, where the depth is not registered with the pictures and
     /// the recording says where both stand.
     pub fn depth_rig(&self) -> Option<DepthRig> {
-        if !self.is_depth_elsewhere() {
-            return None;
-        }
+        self.depth_misfit()?;
         let foreign = &self.foreign_depth;
         let (from, to) = (foreign.topic.as_deref()?, self.chosen.as_deref()?);
         let colour_from_depth = if is_of_realsense(from) {
@@ -368,6 +360,9 @@ impl<R: Read + Seek> Reader<R> {
             return Some(format!("frames {depth} and {picture}"));
         }
         let topic = foreign.topic.as_deref().filter(|t| !is_registered(t))?;
+        if is_of_realsense(topic) {
+            return Some("a RealSense camera has its depth beside its colours".to_owned());
+        }
         let (depth, picture) = (self.camera_beside(topic)?, self.picture_camera()?);
         let differ = !is_same_view(&depth.for_size(picture.size), &picture);
         differ.then(|| "its camera is another one".to_owned())

@@ -9,11 +9,10 @@ use super::photograph::{NotSeen, Photograph};
 use super::{paths, widened};
 use crate::model::{BranchGraph, Outline, Size};
 
-/// Leaves do not differ from what is around the crown if they do by fewer standard errors, and surely do by so
-/// many. Round six trees of made photographs it is 7.1 to 23, on 24 places of their lawns 3.5 at most (even
-/// seeds of 36002 to 36006, 38002, 38006, 39002); beside a tree of the same kind it is less.
+/// Leaves differ from what is around the crown if they do by so many standard errors. Round six trees of made
+/// photographs it is 7.1 to 23, on 24 places of their lawns 3.5 at most (even seeds of 36002 to 36006, 38002,
+/// 38006, 39002); beside a tree of the same kind it is less than 5.
 const LEAST_CROWN_DEVIATIONS: f64 = 3.5;
-const SURE_CROWN_DEVIATIONS: f64 = 7.0;
 /// A crown without leaves holds branches of this length at least, by its own size (the root of its area),
 /// and one in leaf is no farther from the trunk than so much of it.
 const LEAST_WOOD: f64 = 0.5;
@@ -46,12 +45,6 @@ pub fn refuse_like_rest(deviations: Option<f64>) -> Result<(), NotSeen> {
         Some(deviations) if deviations < LEAST_CROWN_DEVIATIONS => Err(NotSeen::Leaves),
         _ => Ok(()),
     }
-}
-
-/// Whether leaves differ from what is around the crown, but not for sure: as those of a neighbour of the
-/// same kind.
-pub fn is_doubtful(deviations: Option<f64>) -> bool {
-    deviations.is_some_and(|deviations| deviations < SURE_CROWN_DEVIATIONS)
 }
 
 /// How far off the crown each pixel is, px; 0 within it.

@@ -66,8 +66,6 @@ pub struct SeenInPhotograph {
     /// By how many standard errors the colours along the trunk's stroke differ from those at either side;
     /// `None` where too little of it is in sight.
     pub trunk_deviations: Option<f64>,
-    /// Whether the leaves within the crown hardly differ from what is around it.
-    pub is_crown_doubtful: bool,
     /// The strokes, by their place among all, along which nothing is seen that differs from what is beside
     /// them.
     pub doubtful: Vec<usize>,
@@ -171,7 +169,6 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         in_leaf: mask.in_leaf,
         tree,
         trunk_deviations: on_strokes.trunk_deviations,
-        is_crown_doubtful: crown::is_doubtful(crown_deviations),
         doubtful: on_strokes.doubtful,
     })
 }
