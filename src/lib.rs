@@ -27,11 +27,11 @@
 //! · `track` points followed · `markers` coloured markers followed · [`tag`] a printed tag that
 //! gives the scale · [`depth`] what a depth camera has seen of a point · [`hierarchy`] which points
 //! move together · `wood` which pixels are wood · [`skeleton`] in the picture · [`shape`] in space
-//! · [`geometry`] its wood and leaves as meshes · [`motion`] the pose in every frame · [`dynamics`] frequency and damping · [`animate`]
-//! motion that was not filmed · [`grow`] new trees like an example · [`import`] sketches,
-//! modelled trees and point clouds · [`cloud`] trees in point clouds · [`calibrate`] a lens by a chessboard ·
-//! [`signal`] common mathematics · [`random`] seeded random numbers · [`caught`] panics of other
-//! crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
+//! · [`geometry`] its wood and leaves as meshes · [`motion`] the pose in every frame ·
+//! [`dynamics`] frequency and damping · [`animate`] motion that was not filmed · [`grow`] new trees
+//! like an example · [`import`] sketches, modelled trees and point clouds · [`cloud`] trees in
+//! point clouds · [`calibrate`] a lens by a chessboard · [`signal`] common mathematics · [`random`]
+//! seeded random numbers · [`caught`] panics of other crates · [`draw`] pictures of the model · [`pipeline`] all of it, step by step · `runtime` on
 //! threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
 //! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
 //! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the

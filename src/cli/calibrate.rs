@@ -9,6 +9,7 @@ use crate::export::lens_profile::lens_profile;
 use crate::files::{OutputFile, refuse_taken};
 use crate::model::{Luma, Size};
 use crate::source::{self, Decoder, Source};
+use anyhow::Context;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -55,15 +56,14 @@ pub fn run(args: &CalibrateArgs) -> Result<(), CommandError> {
     let source = source::open(&args.input, &config, Some(LOOKS_PER_S));
     let mut source = source.map_err(CommandError::no_input)?;
     let seen = see(source.as_mut(), args.squares)?;
-    let size = seen.size;
-    let of_input = |e: anyhow::Error| e.context(args.input.display().to_string());
-    let calibration = calibrate(args.squares, &seen.views, size)
-        .map_err(|e| CommandError::Failed(of_input(e.into())))?;
+    let calibration = calibrate(args.squares, &seen.views, seen.size)
+        .with_context(|| args.input.display().to_string())
+        .map_err(CommandError::Failed)?;
     let name = args.out.file_stem().unwrap_or_default().to_string_lossy();
     let file = OutputFile::create(&args.out)?;
     file.write(&lens_profile(&name, &calibration), stop.while_writing())?;
     file.publish()?;
-    print_summary(args, &seen, &calibration, size);
+    print_summary(args, &seen, &calibration);
     Ok(())
 }
 
@@ -110,11 +110,14 @@ fn see(source: &mut dyn Source, board: Board) -> Result<Seen, CommandError> {
     Ok(seen)
 }
 
-fn print_summary(args: &CalibrateArgs, seen: &Seen, calibration: &Calibration, size: Size) {
+fn print_summary(args: &CalibrateArgs, seen: &Seen, calibration: &Calibration) {
     let lens = &calibration.lens;
     let [fx, fy, cx, cy, ..] = calibration.deviations;
     let (focal, middle) = (lens.focal_px, lens.middle_px);
-    let width_deg = 2.0 * (0.5 * f64::from(size.width) / focal.x).atan().to_degrees();
+    let width_deg = 2.0
+        * (0.5 * f64::from(seen.size.width) / focal.x)
+            .atan()
+            .to_degrees();
     eprint_line(&format!(
         "{}: {} views of {} pictures with the board, of {}; corners are off by {:.2} px",
         args.out.display(),

@@ -1,9 +1,9 @@
 //! Point clouds to trees.
 //!
 //! [`tree_of_cloud`] is the whole way: ground and noise off, points thinned, joined to their
-//! neighbours; several trees parted from each other ([`stems`]); the foot of the trunk; middle lines by the shortest ways from there ([`levels`]) or
-//! by space colonisation ([`colonise`]); branches that hardly stand out pruned; radii by circles
-//! and tapers ([`radius`]).
+//! neighbours; several trees parted from each other ([`stems`]); the foot of the trunk; middle
+//! lines by the shortest ways from there ([`levels`]) or by space colonisation ([`colonise`]);
+//! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]).
 
 mod circle;
 mod colonise;

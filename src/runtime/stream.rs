@@ -126,7 +126,8 @@ fn counts(shared: &Shared) -> String {
         format!(",\"without_depth\":{}", depth.counts.frames_without)
     });
     format!(
-        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\"reconnects\":{}{depth}",
+        ",\"dropped\":{},\"dropped_by_sequence\":{by_sequence},\"dropped_by_time\":{},\"broken\":{},\
+         \"reconnects\":{}{depth}",
         shared.counts.lost_in_camera.load(Ordering::Relaxed),
         c.lost_by_time,
         c.damaged + c.stale + shared.counts.undecodable.load(Ordering::Relaxed),

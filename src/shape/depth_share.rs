@@ -9,8 +9,8 @@ const CROWN_SHARE: f64 = 0.3;
 const MOST_STRETCHED: f64 = 3.0;
 
 /// Stretches all depths by one factor, so that the deviation of the crown's wood from front to back, by its
-/// lengths as they were, is `share` of the geometric mean of that from side to side and the tree's height. Places in the picture stay; a
-/// flat tree stays flat.
+/// lengths as they were, is `share` of the geometric mean of that from side to side and the tree's height.
+/// Places in the picture stay; a flat tree stays flat.
 ///
 /// By the width alone a crown of which two limbs happen to lie in the picture's plane becomes deep too, and one
 /// whose limbs lie behind each other becomes shallow.

@@ -35,8 +35,8 @@ fn hz(interval: Fraction) -> Option<f64> {
     (hz.is_finite() && hz > 0.0).then_some(hz)
 }
 
-/// All that the device lists and we can read: depth or pictures, whichever is wished for. Of a range the size or rate nearest to `wish` stands
-/// for all, beside its ends.
+/// All that the device lists and we can read: depth or pictures, whichever is wished for. Of a range
+/// the size or rate nearest to `wish` stands for all, beside its ends.
 pub(super) fn modes(device: &Device, wish: &Wish) -> Vec<Mode> {
     let mut modes = Vec::new();
     let listed = device.enum_formats().unwrap_or_default();
