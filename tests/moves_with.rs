@@ -161,7 +161,7 @@ fn a_film_says_the_same_of_a_tree_with_bends() {
             );
         }
         // Too short to be looked at.
-        let short = film.until(20);
+        let short = film.part(0..20);
         let sway = analyse(&bent.skeleton, &short, &config, Depth::Full, &cancel).sway;
         assert_eq!(sway.len(), bent.skeleton.measured());
     }

@@ -181,7 +181,7 @@ fn released_twice_in_a_film() {
 
 #[test]
 fn release_before_the_film() {
-    let found = run(100..140, Drive::Decay, &Filming::default());
+    let found = run(7000..7240, Drive::Decay, &Filming::default());
     found.print("already swinging, 12 s");
     found.holds(0.9, 0.7, Both::new(0.003, 0.06), Both::new(0.88, 0.88));
 }
@@ -200,19 +200,19 @@ fn release_for_the_trunk_from_30_s() {
 }
 
 /// In 30 s of wind chance itself moves the answer by some hundredth of the frequency; no method
-/// does better.
+/// does better. One trunk in ten is off by 37 mHz (240 trees); of sixty trees it may be 24.
 #[test]
 fn wind() {
     let filming = Filming {
         seconds: 30.0,
         ..Filming::default()
     };
-    let found = run(300..360, Drive::Wind, &filming);
+    let found = run(6000..6240, Drive::Wind, &filming);
     found.print("wind, 30 s");
     found.holds(0.9, 0.45, Both::new(0.013, 0.25), Both::new(0.93, 0.93));
     let [median, most] = [0.5, 0.9].map(|q| quantile(found.trunk_hz.clone(), q));
     assert!(
-        median < 0.01 && most < 0.025,
+        median < 0.01 && most < 0.04,
         "the trunk is off by {median} Hz, in one of ten by {most} Hz"
     );
 }

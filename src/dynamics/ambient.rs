@@ -41,12 +41,12 @@ const STOPPING: Stopping = Stopping {
     min_gain: 1e-2,
 };
 
-/// The lowest mode of `points` in `frames` of `film`, each some neighbours taken together, looked
-/// for `within_hz`. `None` where none is found, and where `cancel` ends the work before.
+/// The lowest mode of `points` in `frames` of `film`, looked for `within_hz`. `None` where none is
+/// found, and where `cancel` ends the work before.
 pub(super) fn fundamental(
     film: &Film,
     points: &Points,
-    frames: &[Vec<usize>],
+    frames: &[usize],
     within_hz: Bounds,
     cancel: &CancelToken,
 ) -> Option<Oscillator> {

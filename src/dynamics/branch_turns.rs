@@ -8,7 +8,7 @@
 //! (Rubin and Thayer 1982). What a point does not show is filled in from the angles.
 
 use super::branch_tree::BranchTree;
-use super::film::{Film, FilmTrack, NOT_SEEN};
+use super::film::Film;
 use super::members::{count_seen, evenly_chosen, is_seen, mean_px};
 use crate::model::NodeId;
 use nalgebra::{DMatrix, DVector, Point2, Vector2};
@@ -33,14 +33,14 @@ const FIRST_NOISE_PX: f64 = 0.3;
 const MIN_NOISE_PX: f64 = 0.02;
 const MIN_VARIANCE: f64 = 1e-12;
 
-/// The angle of one branch against what carries it in each of `frames`, each some neighbours taken
-/// together: rad, clockwise in the picture. Its size is known to a tenth or two, as that of the arms
-/// is. `None` where no point tells it.
+/// The angle of one branch against what carries it in each of `frames`: rad, clockwise in the
+/// picture. Its size is known to a tenth or two, as that of the arms is. `None` where no point tells
+/// it.
 pub(super) fn turn_of(
     branch: NodeId,
     tree: &BranchTree,
     film: &Film,
-    frames: &[Vec<usize>],
+    frames: &[usize],
 ) -> Option<Vec<f64>> {
     let points = points(film, frames);
     let branches = branches_told_apart(tree, &points);
@@ -60,11 +60,11 @@ struct Place {
 }
 
 /// Points that were seen for long enough.
-fn points(film: &Film, frames: &[Vec<usize>]) -> Vec<Place> {
+fn points(film: &Film, frames: &[usize]) -> Vec<Place> {
     let least = (MIN_SEEN_SHARE * frames.len() as f64).max(1.0);
     let mut enough = Vec::new();
     for track in &film.tracks {
-        let at_px = places_px(track, frames);
+        let at_px: Vec<Point2<f64>> = frames.iter().map(|&k| track.at_px[k]).collect();
         if count_seen(&at_px) as f64 >= least {
             let node = track.node;
             enough.push(Place { node, at_px });
@@ -77,17 +77,6 @@ fn points(film: &Film, frames: &[Vec<usize>]) -> Vec<Place> {
         if chosen.binary_search(&k).is_ok() {
             out.push(point);
         }
-    }
-    out
-}
-
-/// Mean place in each of `frames`.
-fn places_px(track: &FilmTrack, frames: &[Vec<usize>]) -> Vec<Point2<f64>> {
-    let mut out = Vec::with_capacity(frames.len());
-    for frame in frames {
-        let at_px: Vec<Point2<f64>> = frame.iter().map(|&k| track.at_px[k]).collect();
-        let is_shown = at_px.iter().any(is_seen);
-        out.push(if is_shown { mean_px(&at_px) } else { NOT_SEEN });
     }
     out
 }
@@ -285,6 +274,7 @@ impl Fit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dynamics::film::{FilmTrack, NOT_SEEN};
     use crate::model::{Node, Size, Skeleton};
     use crate::random::generator;
     use rand::RngExt;
@@ -349,7 +339,7 @@ mod tests {
     }
 
     fn turn(branch: usize, film: &Film) -> Option<Vec<f64>> {
-        let frames: Vec<Vec<usize>> = (0..FRAMES).map(|k| vec![k]).collect();
+        let frames: Vec<usize> = (0..FRAMES).collect();
         turn_of(NodeId(branch as u32), &tree(), film, &frames)
     }
 

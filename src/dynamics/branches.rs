@@ -12,9 +12,6 @@ use crate::cancel::CancelToken;
 use crate::model::{Interval, NodeId, Swaying, Unidentified};
 use nalgebra::Point2;
 
-/// Share of half the rate of the frames up to which frequencies are looked for.
-pub(super) const BELOW_NYQUIST: f64 = 0.9;
-
 /// Frequencies that are nearer to each other than so many standard deviations are one.
 const SAME_FREQ_SIGMAS: f64 = 2.0;
 /// The interval of the trunk, which all points move with and every film should show, may be so many

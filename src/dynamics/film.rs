@@ -1,5 +1,6 @@
 //! The points of a film, by the branch that they are on: what sway is measured from.
 
+use super::members::mean_px;
 use crate::model::{LogWindow, NodeId, Skeleton, TrackId};
 use crate::signal::statistics::nth_smallest;
 use nalgebra::Point2;
@@ -126,17 +127,11 @@ impl Film {
             .map_or(0.0, |(b, a)| b - a)
     }
 
-    /// The first frames of the film, without frame `to` and what comes after; itself where nothing
-    /// comes after.
-    pub fn until(&self, to: usize) -> Cow<'_, Self> {
-        if to >= self.times_s.len() {
+    /// Some of the frames; itself where these are all.
+    pub fn part(&self, frames: Range<usize>) -> Cow<'_, Self> {
+        if frames.len() == self.times_s.len() {
             return Cow::Borrowed(self);
         }
-        Cow::Owned(self.part(0..to))
-    }
-
-    /// Some of the frames.
-    pub(super) fn part(&self, frames: Range<usize>) -> Self {
         let mut tracks = Vec::with_capacity(self.tracks.len());
         for track in &self.tracks {
             tracks.push(FilmTrack {
@@ -144,43 +139,59 @@ impl Film {
                 at_px: track.at_px[frames.clone()].to_vec(),
             });
         }
-        Self {
+        Cow::Owned(Self {
             times_s: self.times_s[frames].to_vec(),
             tracks,
+        })
+    }
+
+    /// Each `every` neighbouring frames as one: the means of their times, and of the places of each
+    /// point in those that show it. Frames between which some are missing are not put together.
+    pub(super) fn in_means_of(&self, every: usize) -> Cow<'_, Self> {
+        if every < 2 {
+            return Cow::Borrowed(self);
         }
+        let neighbours = self.neighbours(every);
+        let mut tracks = Vec::with_capacity(self.tracks.len());
+        for track in &self.tracks {
+            let places = neighbours
+                .iter()
+                .map(|of| mean_px(&track.at_px[of.clone()]));
+            tracks.push(FilmTrack {
+                node: track.node,
+                at_px: places.collect(),
+            });
+        }
+        let times_s = neighbours.iter().map(|of| {
+            let frames = of.len() as f64;
+            self.times_s[of.clone()].iter().sum::<f64>() / frames
+        });
+        Cow::Owned(Self {
+            times_s: times_s.collect(),
+            tracks,
+        })
     }
 
-    /// Number of frames in a period of `rate_hz`, with its fraction.
-    pub(super) fn frames_per_period(&self, rate_hz: f64) -> f64 {
-        1.0 / (rate_hz * self.step_s())
-    }
-
-    /// Some of the frames by `every` neighbours; those between which frames are missing are not put
-    /// together.
-    pub(super) fn neighbours(&self, frames: Range<usize>, every: usize) -> Vec<Vec<usize>> {
+    /// The frames by `every` neighbours, or fewer where some are missing.
+    fn neighbours(&self, every: usize) -> Vec<Range<usize>> {
         let within_s = (every as f64 - 0.5) * self.step_s();
-        let mut out: Vec<Vec<usize>> = Vec::with_capacity(frames.len() / every + 1);
-        for k in frames {
+        let mut out: Vec<Range<usize>> = Vec::with_capacity(self.times_s.len() / every + 1);
+        for (k, time_s) in self.times_s.iter().enumerate() {
             match out.last_mut() {
                 Some(last)
-                    if last.len() < every && self.times_s[k] - self.times_s[last[0]] < within_s =>
+                    if last.len() < every && time_s - self.times_s[last.start] < within_s =>
                 {
-                    last.push(k)
+                    last.end = k + 1;
                 }
-                _ => out.push(vec![k]),
+                _ => out.push(k..k + 1),
             }
         }
         out
     }
 
-    /// Mean time of each of `frames`, some neighbours taken together, s.
-    pub(super) fn times_of(&self, frames: &[Vec<usize>]) -> Vec<f64> {
-        frames.iter().map(|of| self.mean_s(of)).collect()
-    }
-
-    /// Mean time of some frames, s.
-    pub(super) fn mean_s(&self, frames: &[usize]) -> f64 {
-        frames.iter().map(|&k| self.times_s[k]).sum::<f64>() / frames.len() as f64
+    /// Times of some frames, s.
+    pub(super) fn times_of(&self, frames: &[usize]) -> Vec<f64> {
+        frames.iter().map(|&k| self.times_s[k]).collect()
     }
 
     /// Time that three quarters of the frames are not farther apart than, s; infinite for less than
@@ -234,10 +245,8 @@ mod tests {
                 at_px,
             }],
         );
-        assert!(
-            matches!(film.until(4), Cow::Borrowed(_)) && matches!(film.until(9), Cow::Borrowed(_))
-        );
-        let cut = film.until(3);
+        assert!(matches!(film.part(0..4), Cow::Borrowed(_)));
+        let cut = film.part(0..3);
         assert_eq!(
             (cut.times_s.len(), cut.tracks[0].at_px.last()),
             (3, Some(&Point2::new(2.0, 1.0)))

@@ -13,7 +13,7 @@ use super::decay::Mode;
 use super::film::Film;
 use super::fit::Prior;
 use super::members::{Points, mean_px};
-use super::release::{Onset, RELEASE_SD_FRAMES};
+use super::release::{Onset, ReleaseTime};
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::sway::UsableFilm;
@@ -87,6 +87,7 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         members,
         trunk,
         onset,
+        release,
         limits,
         ..
     } = usable;
@@ -97,7 +98,15 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         .filter(|all| all.points.rms_px() >= NOISE_PX);
     let with_motions = tree.branches.get(trunk.index()).zip(decaying);
     let fundamental = match with_motions {
-        Some((trunk, motions)) => fundamental(motions, film, trunk.base_px, onset, limits, cancel),
+        Some((trunk, motions)) => fundamental(
+            motions,
+            film,
+            trunk.base_px,
+            onset.start,
+            release,
+            limits,
+            cancel,
+        ),
         None => Err(Unidentified::NotMeasured),
     };
     let mut estimator = FreeDecay {
@@ -108,22 +117,12 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         members,
         onset,
         limits,
-        release: ReleaseTime {
-            at_s: onset.at_s,
-            sd_s: RELEASE_SD_FRAMES * film.step_s(),
-        },
+        release: *release,
         own: vec![None; members.len()],
         mixed: vec![None; members.len()],
         trunk_is_known: false,
     };
     from_the_trunk_up(tree, members, cancel, &mut estimator)
-}
-
-/// When the tree was released, and how sure that is: the trunk's own fit knows it better than the
-/// eye.
-struct ReleaseTime {
-    at_s: f64,
-    sd_s: f64,
 }
 
 struct FreeDecay<'a> {
@@ -135,6 +134,7 @@ struct FreeDecay<'a> {
     members: &'a [Vec<usize>],
     onset: &'a Onset,
     limits: &'a SearchLimits,
+    /// The trunk's own fit knows it better than the eye.
     release: ReleaseTime,
     /// By branch: modes that are a branch's own.
     own: Vec<Option<BranchMode>>,
@@ -158,7 +158,7 @@ impl BranchEstimator for FreeDecay<'_> {
 impl FreeDecay<'_> {
     /// The sway of a branch by its points and the modes of its carriers.
     fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
-        let points = Points::of(self.film, branch.tracks, self.onset.from);
+        let points = Points::of(self.film, branch.tracks);
         if points.tracks.len() < MIN_POINTS {
             return Err(Unidentified::NotMeasured);
         }
@@ -218,7 +218,7 @@ impl FreeDecay<'_> {
             return Err(Unidentified::TooLittleMotion);
         }
         let fitted = self.fit(branch.node, points);
-        let arms = Arms::new(self.film, points, self.onset.from, branch.base_px);
+        let arms = Arms::new(self.film, points, branch.base_px);
         let parts = self.parts_of(branch, points);
         let Some(chosen) = self.choose(branch.node, &fitted, &arms, &parts) else {
             return Err(fitted.reason_for_none(points));
@@ -258,7 +258,7 @@ impl FreeDecay<'_> {
         for above in self.tree.carriers(node) {
             ancestors.extend(self.own[above.index()]);
         }
-        let times_s = self.film.times_s[self.onset.from..].iter();
+        let times_s = self.film.times_s.iter();
         let signals = Signals::new(
             times_s.map(|t| t - self.release.at_s).collect(),
             &points.signals,
@@ -346,7 +346,7 @@ impl FreeDecay<'_> {
     fn halves_of(&self, points: &Points) -> Vec<Vec<usize>> {
         let mut at_px: Vec<Point2<f64>> = Vec::with_capacity(points.tracks.len());
         for &k in &points.tracks {
-            at_px.push(mean_px(&self.film.tracks[k].at_px[self.onset.from..]));
+            at_px.push(mean_px(&self.film.tracks[k].at_px));
         }
         let along = along_principal_direction(&at_px);
         let mut order: Vec<usize> = (0..at_px.len()).collect();

@@ -4,6 +4,7 @@
 //! In wind any other way would add a motion that the oscillators had to explain. Where a mode is
 //! only told to be of one point or another (modal/points.rs), straight lines are enough.
 
+use super::film::Film;
 use super::members::Points;
 use crate::signal::principal::{PrincipalComponents, symmetric};
 use crate::signal::vectors::dot;
@@ -32,26 +33,28 @@ struct Gap {
     seen: Vec<usize>,
 }
 
-/// Whether enough of the points were seen in one of `frames`, which are neighbours.
-pub(super) fn enough_seen(points: &Points, frames: &[usize]) -> bool {
-    let mut seen = 0;
-    for signal in &points.signals {
-        seen += usize::from(frames.iter().any(|&k| signal[k].is_finite()));
-    }
-    seen as f64 >= MIN_SEEN_SHARE * points.signals.len() as f64
+/// The frames of `film` that show enough of each of these; `None` where there are not so many.
+pub(super) fn frames_with(film: &Film, points: &[&Points], least: usize) -> Option<Vec<usize>> {
+    let mut frames: Vec<usize> = (0..film.times_s.len()).collect();
+    frames.retain(|&k| points.iter().all(|points| enough_seen(points, k)));
+    (frames.len() >= least).then_some(frames)
+}
+
+/// Whether enough of the points were seen in a frame.
+fn enough_seen(points: &Points, frame: usize) -> bool {
+    let seen = points.signals.iter().filter(|s| s[frame].is_finite());
+    seen.count() as f64 >= MIN_SEEN_SHARE * points.signals.len() as f64
 }
 
 impl GapFree {
-    /// Of `points` in `frames`, each some neighbours taken together as their mean.
-    pub fn of(points: &Points, frames: &[Vec<usize>]) -> Self {
+    /// Of `points` in some frames.
+    pub fn of(points: &Points, frames: &[usize]) -> Self {
         let mut signals: Vec<Vec<f64>> = Vec::with_capacity(points.signals.len());
         for signal in &points.signals {
-            signals.push(frames.iter().map(|of| mean_of_seen(signal, of)).collect());
+            signals.push(frames.iter().map(|&k| signal[k]).collect());
         }
         let values = points.seen_values().count() as f64;
-        let frames_taken = frames.iter().map(Vec::len).sum::<usize>() as f64;
-        let per_mean = frames_taken / frames.len().max(1) as f64;
-        let noise = points.noise() / values.max(1.0) / per_mean.max(1.0);
+        let noise = points.noise() / values.max(1.0);
         let mut out = Self { signals, noise };
         out.fill_gaps();
         out
@@ -140,18 +143,6 @@ impl GapFree {
     }
 }
 
-/// No number where none of `frames` shows it.
-fn mean_of_seen(signal: &[f64], frames: &[usize]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for &k in frames {
-        if signal[k].is_finite() {
-            sum += signal[k];
-            count += 1.0;
-        }
-    }
-    sum / count
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -180,8 +171,8 @@ mod tests {
             tracks: (0..4).collect(),
             signals,
         };
-        let frames: Vec<Vec<usize>> = (0..300).map(|k| vec![k]).collect();
-        assert!(enough_seen(&points, &frames[120]));
+        let frames: Vec<usize> = (0..300).collect();
+        assert!(enough_seen(&points, 120));
         let filled = GapFree::of(&points, &frames).signals;
         for (i, filled) in filled.iter().enumerate().skip(6) {
             let off = (100..160)

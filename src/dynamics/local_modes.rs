@@ -8,11 +8,12 @@ use super::branches::LnDeviations;
 use super::decay::Mode;
 use super::driven_modes::{Band, DrivenMode, Spectrum, Start};
 use super::film::Film;
+use super::gap_free::frames_with;
 use super::members::{Points, mean_px};
 use super::motions::Motions;
-use super::sampling::Sampling;
 use super::subspace::{LAGS_S, StablePole, stable_poles};
 use super::turns::{TurnedPoints, turned_points};
+use super::wind;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::NodeId;
@@ -70,7 +71,7 @@ pub(super) fn local_modes(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
-    sampling: &Sampling,
+    frequencies_hz: Bounds,
     cancel: &CancelToken,
 ) -> Vec<LocalMode> {
     let mut out = Vec::new();
@@ -78,8 +79,8 @@ pub(super) fn local_modes(
         if cancel.is_cancelled() {
             break;
         }
-        if let Some(window) = Window::of(tree, film, members, branch, sampling) {
-            out.extend(window.modes(sampling.frequencies_hz, cancel));
+        if let Some(window) = Window::of(tree, film, members, branch) {
+            out.extend(window.modes(frequencies_hz, cancel));
         }
     }
     out
@@ -103,23 +104,17 @@ fn points_of_carriers(
 }
 
 impl Window {
-    fn of(
-        tree: &BranchTree,
-        film: &Film,
-        members: &[Vec<usize>],
-        branch: NodeId,
-        sampling: &Sampling,
-    ) -> Option<Self> {
-        let mut points = Points::up_to(MOST_POINTS, film, &members[branch.index()], 0);
+    fn of(tree: &BranchTree, film: &Film, members: &[Vec<usize>], branch: NodeId) -> Option<Self> {
+        let mut points = Points::up_to(MOST_POINTS, film, &members[branch.index()]);
         let own = points.tracks.len();
         if own < MIN_POINTS {
             return None;
         }
         let of_carriers = points_of_carriers(tree, film, members, branch);
-        let carriers = Points::up_to(MOST_OF_CARRIERS, film, &of_carriers, 0);
+        let carriers = Points::up_to(MOST_OF_CARRIERS, film, &of_carriers);
         points.tracks.extend(carriers.tracks);
         points.signals.extend(carriers.signals);
-        let frames = sampling.frames_with(&[&points]).ok()?;
+        let frames = frames_with(film, &[&points], wind::MIN_FRAMES)?;
         let motions = Motions::of(film, &points, &frames);
         let mut at_px = Vec::with_capacity(points.tracks.len());
         for &k in &points.tracks {

@@ -4,7 +4,7 @@ use super::branch_tree::BranchTree;
 use super::film::Film;
 use crate::model::NodeId;
 use crate::signal::statistics::{noise_variance, rms};
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 /// Points of a branch at most that are fitted; more cost time and tell little more.
 const MAX_POINTS: usize = 20;
@@ -14,7 +14,7 @@ const ENOUGH_WHOLE: usize = 12;
 const MIN_SEEN_SHARE: f64 = 0.5;
 const MIN_SEEN_FRAMES: usize = 24;
 
-/// The signals of some points from some frame on, two a point.
+/// The signals of some points, two a point.
 pub(super) struct Points {
     /// Of the film's tracks.
     pub tracks: Vec<usize>,
@@ -46,18 +46,18 @@ pub(super) fn trunk(tree: &BranchTree, members: &[Vec<usize>]) -> NodeId {
 }
 
 impl Points {
-    /// Of those of `tracks` that were seen for long enough, in the film's frames from `from` on.
-    pub fn of(film: &Film, tracks: &[usize], from: usize) -> Self {
-        Self::up_to(MAX_POINTS, film, tracks, from)
+    /// Of those of `tracks` that were seen for long enough.
+    pub fn of(film: &Film, tracks: &[usize]) -> Self {
+        Self::up_to(MAX_POINTS, film, tracks)
     }
 
     /// The same, of at most so many points.
-    pub fn up_to(most: usize, film: &Film, tracks: &[usize], from: usize) -> Self {
-        let rows = film.times_s.len() - from;
+    pub fn up_to(most: usize, film: &Film, tracks: &[usize]) -> Self {
+        let rows = film.times_s.len();
         let least = ((MIN_SEEN_SHARE * rows as f64) as usize).max(MIN_SEEN_FRAMES);
         let (mut all, mut whole) = (Vec::new(), Vec::new());
         for &k in tracks {
-            let seen = count_seen(&film.tracks[k].at_px[from..]);
+            let seen = count_seen(&film.tracks[k].at_px);
             if seen >= least {
                 all.push(k);
             }
@@ -72,7 +72,7 @@ impl Points {
         let tracks = evenly_chosen(&all, most);
         let mut signals = Vec::with_capacity(2 * tracks.len());
         for &k in &tracks {
-            signals.extend(centred(&film.tracks[k].at_px[from..]));
+            signals.extend(centred(&film.tracks[k].at_px));
         }
         Self { tracks, signals }
     }
@@ -131,13 +131,11 @@ pub(super) fn is_seen(p: &Point2<f64>) -> bool {
     p.x.is_finite() && p.y.is_finite()
 }
 
-/// Mean of the places at which a point was seen, px.
+/// Mean of the places at which a point was seen, px; no numbers where it never was.
 pub(super) fn mean_px(at_px: &[Point2<f64>]) -> Point2<f64> {
-    let n = count_seen(at_px).max(1) as f64;
-    at_px
-        .iter()
-        .filter(|p| is_seen(p))
-        .fold(Point2::origin(), |m, p| m + p.coords / n)
+    let n = count_seen(at_px) as f64;
+    let seen = at_px.iter().filter(|p| is_seen(p));
+    Point2::from(seen.map(|p| p.coords).sum::<Vector2<f64>>() / n)
 }
 
 fn centred(at_px: &[Point2<f64>]) -> [Vec<f64>; 2] {

@@ -11,8 +11,6 @@ use nalgebra::{DVector, Vector2};
 /// Motions that are kept at most, and those that a subspace is of.
 const MOST: usize = 24;
 pub(super) const OF_SUBSPACE: usize = 8;
-/// Variance of a motion against that of noise, from which it is one.
-const LEAST_ABOVE_NOISE: f64 = 2.0;
 
 /// The few motions that those of many points are made of.
 pub(super) struct Motions {
@@ -27,8 +25,8 @@ pub(super) struct Motions {
 }
 
 impl Motions {
-    /// Of `points` in `frames` of `film`, each some neighbours taken together.
-    pub fn of(film: &Film, points: &Points, frames: &[Vec<usize>]) -> Self {
+    /// Of `points` in `frames` of `film`.
+    pub fn of(film: &Film, points: &Points, frames: &[usize]) -> Self {
         let GapFree { signals, noise } = GapFree::of(points, frames);
         let mut principal = PrincipalComponents::of_signals(&signals);
         principal.directions.truncate(MOST);
@@ -69,9 +67,13 @@ impl Motions {
         out
     }
 
-    /// How many of them are larger than noise.
+    /// How many of them are larger than any that noise has: the variances of the principal
+    /// components of white noise end at an edge that follows from the numbers of signals and of
+    /// times (Marchenko and Pastur 1967).
     pub fn above_noise(&self) -> usize {
-        let least = LEAST_ABOVE_NOISE * self.noise;
+        let signals = self.directions.first().map_or(0, Vec::len) as f64;
+        let edge = 1.0 + (signals / self.times_s.len().max(1) as f64).sqrt();
+        let least = edge * edge * self.noise;
         self.variances.iter().filter(|v| **v > least).count()
     }
 

@@ -1,73 +1,55 @@
-//! Which frames of a film in wind are taken together, and which frequencies they show.
+//! Which frames of a film are used, in means of neighbours: one set of signals for all estimators.
 
-use super::branches::SearchLimits;
 use super::film::Film;
-use super::gap_free::enough_seen;
-use super::members::Points;
-use crate::bounds::Bounds;
-use crate::model::Unidentified;
+use std::borrow::Cow;
+use std::ops::Range;
 
 /// Frames a period of the highest frequency beyond which neighbours are taken together as their
-/// mean: they cost time and tell little.
+/// mean: they cost time and say little. A mean hides what is faster, and does not show it as
+/// something slower.
 const FRAMES_PER_PERIOD: f64 = 3.0;
-/// Longer films, in frames that are left, are thinned to so many a second, if there are as many;
-/// and frequencies are looked for up to this share of the rate. A mean over neighbours hides what
-/// is faster, and does not show it as something slower.
+/// Longer films of wind, in frames that are left, are thinned to so many a second, if there are as
+/// many.
 const LONG_FILM_FRAMES: usize = 900;
 const LONG_FILM_HZ: f64 = 7.5;
-const MAX_FREQ_OF_RATE: f64 = 0.3;
-const MIN_FRAMES: usize = 48;
+/// Share of the rate of the frames up to which frequencies are looked for, and of the rate of means:
+/// these weaken a motion that is nearly as fast as half their rate, and one that is faster shows as a
+/// slower one.
+const SHOWN_BY_FRAMES: f64 = 0.45;
+const SHOWN_BY_MEANS: f64 = 0.3;
 
-/// A film in means of some neighbouring frames.
-pub(super) struct Sampling<'a> {
-    film: &'a Film,
-    /// Neighbouring frames that are taken together.
-    every: usize,
-    /// Frequencies that are looked for in these means, Hz.
-    pub frequencies_hz: Bounds,
-}
-
-impl<'a> Sampling<'a> {
-    pub fn of(film: &'a Film, limits: &SearchLimits) -> Self {
-        let every = frames_per_mean(film, limits.highest_hz);
-        Self {
-            film,
-            every,
-            frequencies_hz: frequencies_hz(film, limits.frequencies_hz, every),
-        }
-    }
-
-    /// The frames that show all of these points well enough, by `every` neighbours.
-    pub fn frames_with(&self, points: &[&Points]) -> Result<Vec<Vec<usize>>, Unidentified> {
-        let mut frames = self.film.neighbours(0..self.film.times_s.len(), self.every);
-        frames.retain(|of| points.iter().all(|points| enough_seen(points, of)));
-        if frames.len() < MIN_FRAMES {
-            return Err(Unidentified::TooShort);
-        }
-        Ok(frames)
+/// Some frames of a film after a release, in means of about as many a second as show frequencies up
+/// to `highest_hz`.
+pub(super) fn of_release(film: &Film, frames: Range<usize>, highest_hz: f64) -> Cow<'_, Film> {
+    let every = nearest_to_rate(film, FRAMES_PER_PERIOD * highest_hz);
+    match film.part(frames) {
+        Cow::Borrowed(whole) => whole.in_means_of(every),
+        Cow::Owned(part) => Cow::Owned(part.in_means_of(every).into_owned()),
     }
 }
 
-/// Neighbouring frames that are taken together.
-fn frames_per_mean(film: &Film, highest_hz: f64) -> usize {
-    let fine = nearest_to_rate(film, FRAMES_PER_PERIOD * highest_hz);
-    if film.times_s.len() / fine > LONG_FILM_FRAMES {
-        nearest_to_rate(film, LONG_FILM_HZ).max(fine)
+/// A film of wind in such means, or fewer where it is long.
+pub(super) fn of_wind(film: &Film, highest_hz: f64) -> Cow<'_, Film> {
+    let mut every = nearest_to_rate(film, FRAMES_PER_PERIOD * highest_hz);
+    if film.times_s.len() / every > LONG_FILM_FRAMES {
+        every = every.max(nearest_to_rate(film, LONG_FILM_HZ));
+    }
+    film.in_means_of(every)
+}
+
+/// Highest frequency that is looked for in `film`, Hz: the frames of `filmed`, or means of them.
+pub(super) fn highest_hz(filmed: &Film, film: &Film) -> f64 {
+    let frames_per_mean = film.step_s() / filmed.step_s();
+    let of_rate = if frames_per_mean < 1.5 {
+        SHOWN_BY_FRAMES
     } else {
-        fine
-    }
+        SHOWN_BY_MEANS
+    };
+    of_rate / film.step_s()
 }
 
-/// Frames whose means come at about this rate.
+/// Neighbouring frames whose means come at about this rate.
 fn nearest_to_rate(film: &Film, rate_hz: f64) -> usize {
-    film.frames_per_period(rate_hz).round().max(1.0) as usize
-}
-
-/// Frequencies that are looked for in means of so many frames.
-fn frequencies_hz(film: &Film, within_hz: Bounds, every: usize) -> Bounds {
-    if every == 1 {
-        return within_hz;
-    }
-    let of_rate = MAX_FREQ_OF_RATE / (every as f64 * film.step_s());
-    Bounds::new(within_hz.lo, within_hz.hi.min(of_rate))
+    let frames = 1.0 / (rate_hz * film.step_s());
+    frames.round().max(1.0) as usize
 }

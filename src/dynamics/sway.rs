@@ -1,14 +1,15 @@
 //! Frequency and damping of every branch of a film.
 
 use super::branch_tree::BranchTree;
-use super::branches::{BELOW_NYQUIST, SearchLimits};
+use super::branches::SearchLimits;
 use super::decaying_motions::DecayingMotions;
 use super::film::Film;
 use super::free_decay;
 use super::members::{members, trunk};
 use super::modal;
 use super::point_modes::{PointModes, Shoot, is_open, may_have_other};
-use super::release::{FoundOnset, Onset, onset};
+use super::release::{FoundOnset, Onset, ReleaseTime, onset};
+use super::sampling;
 use super::tree_modes;
 use super::whole_tree::{modes_of_tree, withdraw_small};
 use super::wind;
@@ -142,11 +143,12 @@ pub(super) struct UsableFilm<'a> {
     /// The branch on the foot that most of them are on or above.
     pub trunk: NodeId,
     pub onset: Onset,
+    pub release: ReleaseTime,
     pub releases_s: Vec<f64>,
     /// The motions of all points after a release, where there are enough frames.
     pub decaying: Option<DecayingMotions>,
     pub limits: SearchLimits,
-    /// As far as it is used.
+    /// The frames that are used, in means of neighbours.
     pub film: Cow<'a, Film>,
 }
 
@@ -183,15 +185,15 @@ impl<'a> UsableFilm<'a> {
     /// An error where there is too little film, or `cancel` ends the work before.
     pub fn of(
         tree: &BranchTree,
-        film: &'a Film,
+        filmed: &'a Film,
         config: &Dynamics,
         cancel: &CancelToken,
     ) -> Result<Self, Unidentified> {
-        if film.times_s.len() < LEAST_FRAMES || film.span_s() <= 0.0 {
+        if filmed.times_s.len() < LEAST_FRAMES || filmed.span_s() <= 0.0 {
             return Err(Unidentified::TooShort);
         }
-        let highest_hz = (BELOW_NYQUIST * 0.5 / film.step_s()).min(config.highest_hz);
-        let frequencies_hz = Bounds::new(LEAST_PERIODS / film.span_s(), highest_hz);
+        let highest_hz = sampling::highest_hz(filmed, filmed).min(config.highest_hz);
+        let frequencies_hz = Bounds::new(LEAST_PERIODS / filmed.span_s(), highest_hz);
         if frequencies_hz.is_empty() {
             return Err(Unidentified::TooShort);
         }
@@ -200,25 +202,29 @@ impl<'a> UsableFilm<'a> {
             Excited::Release => Some(Excitation::Release),
             Excited::Wind => Some(Excitation::Wind),
         };
-        let members = members(tree, film);
+        let members = members(tree, filmed);
         let trunk = trunk(tree, &members);
         let of_tree: &[usize] = members.get(trunk.index()).map_or(&[], Vec::as_slice);
         let FoundOnset {
             onset,
+            release,
             releases_s,
             decaying,
-        } = onset(film, of_tree, given, frequencies_hz, cancel);
+            film,
+        } = onset(filmed, of_tree, given, frequencies_hz, cancel);
         if cancel.is_cancelled() {
             return Err(Unidentified::NotInTime);
         }
-        let film = film.until(onset.to);
-        if film.times_s.len() - onset.from < LEAST_FRAMES {
+        if onset.to - onset.from < LEAST_FRAMES {
             return Err(Unidentified::TooShort);
         }
+        let highest_hz = highest_hz.min(sampling::highest_hz(filmed, &film));
+        let frequencies_hz = Bounds::new(frequencies_hz.lo, highest_hz);
         Ok(Self {
             members,
             trunk,
             onset,
+            release,
             releases_s,
             decaying,
             limits: SearchLimits {

@@ -17,12 +17,12 @@ pub(super) struct Arms(Vec<Vector2<f64>>);
 type Factors = [f64; 4];
 
 impl Arms {
-    pub fn new(film: &Film, points: &Points, from: usize, base_px: Point2<f64>) -> Self {
+    pub fn new(film: &Film, points: &Points, base_px: Point2<f64>) -> Self {
         Self::at(
             points
                 .tracks
                 .iter()
-                .map(|k| mean_px(&film.tracks[*k].at_px[from..])),
+                .map(|k| mean_px(&film.tracks[*k].at_px)),
             base_px,
         )
     }

@@ -93,7 +93,7 @@ impl Take {
             }
             from = cut.between.end;
         }
-        let part = film.part(best);
+        let part = film.part(best).into_owned();
         Self {
             left_out_s: film.span_s() - part.span_s(),
             film: part,

@@ -13,7 +13,6 @@ use super::film::Film;
 use super::local_modes::{LocalMode, MOST_POINTS, local_modes};
 use super::members::count_among;
 use super::point_modes::{PointMode, PointModes};
-use super::sampling::Sampling;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway};
@@ -76,8 +75,7 @@ pub(super) fn point_modes(
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<PointModes> {
-    let sampling = Sampling::of(film, limits);
-    let mut local = local_modes(tree, film, members, &sampling, cancel);
+    let mut local = local_modes(tree, film, members, limits.frequencies_hz, cancel);
     if cancel.is_cancelled() {
         return None;
     }

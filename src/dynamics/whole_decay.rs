@@ -7,13 +7,13 @@
 //! of `subspace.rs`).
 
 use super::branches::{BranchMode, LnDeviations, SearchLimits};
-use super::decay::Mode;
+use super::decay::{Mode, Start};
 use super::decaying_motions::DecayingMotions;
 use super::film::Film;
 use super::free_decay::{is_too_brief, may_be_sway};
 use super::members::mean_px;
 use super::motions::{Motions, OF_SUBSPACE};
-use super::release::Onset;
+use super::release::ReleaseTime;
 use super::sandwich::deviations;
 use super::signals::{Factor, Fit, Signals};
 use super::swing::Arms;
@@ -42,13 +42,14 @@ pub(super) struct Fundamental {
 ///
 /// # Errors
 /// By most numbers of modes a larger mode is seen for too few periods: a faster one would be taken for
-/// it. Or there are too few points, fewer than half of the numbers have a mode that
-/// a tree may have, or `cancel` ends the work before.
+/// it. Or there are too few points, no motion is more than noise, fewer than half of the numbers have
+/// a mode that a tree may have, or `cancel` ends the work before.
 pub(super) fn fundamental(
     decaying: &DecayingMotions,
     film: &Film,
     base_px: Point2<f64>,
-    onset: &Onset,
+    start: Start,
+    release: &ReleaseTime,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Result<Fundamental, Unidentified> {
@@ -56,7 +57,11 @@ pub(super) fn fundamental(
     if 2 * points.tracks.len() < OF_SUBSPACE {
         return Err(Unidentified::NotMeasured);
     }
-    let by_number = asked(decaying, onset, limits, cancel).ok_or(Unidentified::NotInTime)?;
+    if decaying.motions.above_noise() == 0 {
+        return Err(Unidentified::TooLittleMotion);
+    }
+    let by_number =
+        asked(decaying, start, release, limits, cancel).ok_or(Unidentified::NotInTime)?;
     let too_short = by_number.iter().filter(|f| f.is_too_short).count();
     if 2 * too_short > MOST_MODES - LEAST_MODES {
         return Err(Unidentified::TooShort);
@@ -65,7 +70,7 @@ pub(super) fn fundamental(
     if 2 * found.len() <= MOST_MODES - LEAST_MODES {
         return Err(Unidentified::NoOscillation);
     }
-    central(found, decaying, film, base_px, onset).ok_or(Unidentified::NoOscillation)
+    central(found, decaying, film, base_px).ok_or(Unidentified::NoOscillation)
 }
 
 /// The one of the middle, less sure by how far the others are from it.
@@ -74,7 +79,6 @@ fn central(
     decaying: &DecayingMotions,
     film: &Film,
     base_px: Point2<f64>,
-    onset: &Onset,
 ) -> Option<Fundamental> {
     let points = &decaying.points;
     let frequencies: Vec<f64> = found.iter().map(|f| f.mode.frequency_hz.ln()).collect();
@@ -88,7 +92,7 @@ fn central(
     let places_px = points
         .tracks
         .iter()
-        .map(|&k| mean_px(&film.tracks[k].at_px[onset.from..]));
+        .map(|&k| mean_px(&film.tracks[k].at_px));
     let arms = Arms::at(places_px, base_px);
     let least = LnDeviations {
         frequency: SD_OF_MEDIAN * scatter,
@@ -122,11 +126,12 @@ struct Found {
 /// What each number of modes says.
 fn asked(
     decaying: &DecayingMotions,
-    onset: &Onset,
+    start: Start,
+    release: &ReleaseTime,
     limits: &SearchLimits,
     cancel: &CancelToken,
 ) -> Option<Vec<Asked>> {
-    let signals = decaying.signals(onset.at_s, onset.start, limits.frequencies_hz);
+    let signals = decaying.signals(start, release, limits.frequencies_hz);
     let mut out = Vec::new();
     let mut fit = Fit::default();
     for modes in 1..=MOST_MODES {
@@ -217,9 +222,9 @@ fn in_points(motions: &Motions, factors: &[Factor]) -> Vec<Vec<Factor>> {
 mod tests {
     use super::*;
     use crate::bounds::Bounds;
-    use crate::dynamics::decay::Start;
     use crate::dynamics::film::FilmTrack;
-    use crate::model::{Excitation, NodeId};
+    use crate::dynamics::sampling;
+    use crate::model::NodeId;
     use crate::random::generator;
     use rand::RngExt;
     use std::f64::consts::TAU;
@@ -275,25 +280,24 @@ mod tests {
     ];
 
     fn found(film: &Film, cancel: &CancelToken) -> Result<Fundamental, Unidentified> {
-        let onset = Onset {
-            excitation: Excitation::Release,
-            start: Start::Moving,
+        let release = ReleaseTime {
             at_s: 0.0,
-            from: 0,
-            to: film.times_s.len(),
+            sd_s: 0.02,
         };
         let limits = SearchLimits {
-            frequencies_hz: Bounds::new(0.15, 13.0),
-            highest_hz: 10.0,
+            frequencies_hz: Bounds::new(0.15, 5.0),
+            highest_hz: 5.0,
             max_relative_ci: 0.05,
         };
         let tracks: Vec<usize> = (0..film.tracks.len()).collect();
-        let motions = DecayingMotions::since(onset.from, film, &tracks);
+        let film = sampling::of_release(film, 0..film.times_s.len(), 5.0);
+        let motions = DecayingMotions::of(&film, &tracks);
         fundamental(
             &motions.ok_or(Unidentified::NotMeasured)?,
-            film,
+            &film,
             Point2::new(118.0, 200.0),
-            &onset,
+            Start::Moving,
+            &release,
             &limits,
             cancel,
         )
@@ -330,8 +334,8 @@ mod tests {
     /// 2.2 periods of the trunk's mode, and 2.6 of the limbs'.
     #[test]
     fn of_too_few_periods_there_is_none() {
-        let film = film([8.0, 5.0, 5.0]).part(0..132);
-        let found = found(&film, &CancelToken::new());
+        let whole = film([8.0, 5.0, 5.0]);
+        let found = found(&whole.part(0..132), &CancelToken::new());
         assert_eq!(found.err(), Some(Unidentified::TooShort));
     }
 }

@@ -3,7 +3,7 @@
 
 use super::branch_tree::BranchTree;
 use super::film::Film;
-use super::members::{mean_px, share_among};
+use super::members::{is_seen, mean_px, share_among};
 use super::point_modes::{PointMode, PointModes};
 use super::wind;
 use crate::model::{Excitation, NodeId, Sway, Swaying, TreeMode, Unidentified};
@@ -143,8 +143,11 @@ impl Swing<'_> {
     fn motion_px2(&self, film: &Film) -> Vec<f64> {
         let mut by_track = vec![0.0; film.tracks.len()];
         for &k in self.tracks {
-            let arm_px = mean_px(&film.tracks[k].at_px) - self.pivot_px;
-            by_track[k] = self.angle().powi(2) * arm_px.norm_squared();
+            let at_px = mean_px(&film.tracks[k].at_px);
+            if is_seen(&at_px) {
+                let arm_px = at_px - self.pivot_px;
+                by_track[k] = self.angle().powi(2) * arm_px.norm_squared();
+            }
         }
         by_track
     }

@@ -17,9 +17,8 @@ use super::decay::Mode;
 use super::driven_modes::Spectrum;
 use super::driven_oscillators::{Driven, Oscillator, about_highest_hz};
 use super::film::Film;
-use super::gap_free::GapFree;
+use super::gap_free::{GapFree, frames_with};
 use super::members::{Points, mean_px};
-use super::sampling::Sampling;
 use super::swing::rank_one_fraction;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
@@ -41,6 +40,8 @@ const MAX_ANCESTORS: usize = 2;
 const MAX_CARRIED_MOTIONS: usize = 4;
 const MIN_VARIANCE_OVER_NOISE: f64 = 10.0;
 const MIN_SECOND_VARIANCE: f64 = 0.02;
+/// Frames that are needed.
+pub(super) const MIN_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 pub(super) const NOISE_PX: f64 = 0.15;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
@@ -110,7 +111,6 @@ pub(super) fn sways(
         fundamental: None,
         tree,
         film,
-        sampling: Sampling::of(film, limits),
         members,
         limits,
         known: vec![Known::Nothing; members.len()],
@@ -135,7 +135,6 @@ struct InWind<'a> {
     fundamental: Option<(BranchMode, Sway)>,
     tree: &'a BranchTree,
     film: &'a Film,
-    sampling: Sampling<'a>,
     members: &'a [Vec<usize>],
     limits: &'a SearchLimits,
     /// By branch.
@@ -165,12 +164,12 @@ impl InWind<'_> {
     /// The sway of a branch from its points and those of its carrier.
     fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let speaking = self.speaking(branch.node, branch.tracks);
-        let points = Points::of(self.film, &speaking.tracks, 0);
+        let points = Points::of(self.film, &speaking.tracks);
         if branch.tracks.len() < MIN_POINTS_IN_ALL || points.tracks.len() < MIN_POINTS {
             return Err(Unidentified::NotMeasured);
         }
         let of_carrier = self.speaking(branch.parent, &self.beside(branch));
-        let carrier = Points::of(self.film, &of_carrier.tracks, 0);
+        let carrier = Points::of(self.film, &of_carrier.tracks);
         // What a carrier's own sway is must be known, or be none, and its motion seen, for that of
         // the branch to be told from it.
         let carrier_is_unknown = matches!(self.known[branch.parent.index()], Known::Nothing)
@@ -215,12 +214,12 @@ impl InWind<'_> {
     fn whole_tree(&self) -> Option<(BranchMode, Sway)> {
         let tracks = self.members.get(self.trunk.index())?;
         let base_px = self.tree.branches.get(self.trunk.index())?.base_px;
-        let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks, 0);
-        let frames = self.sampling.frames_with(&[&points]).ok()?;
+        let points = Points::up_to(ambient::MOST_POINTS, self.film, tracks);
+        let frames = frames_with(self.film, &[&points], MIN_FRAMES)?;
         if points.rms_px() < NOISE_PX {
             return None;
         }
-        let within_hz = self.sampling.frequencies_hz;
+        let within_hz = self.limits.frequencies_hz;
         let by_modes = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
         let by_modes = by_modes.filter(|o| !o.at_limit);
         let by_turn = self.by_turn_of_trunk(&points, &frames);
@@ -243,10 +242,10 @@ impl InWind<'_> {
     }
 
     /// The slowest of the larger oscillators in the trunk's turn.
-    fn by_turn_of_trunk(&self, points: &Points, frames: &[Vec<usize>]) -> Option<Oscillator> {
+    fn by_turn_of_trunk(&self, points: &Points, frames: &[usize]) -> Option<Oscillator> {
         let angles = turn_of(self.trunk, self.tree, self.film, frames)?;
         let times_s = self.film.times_of(frames);
-        let within_hz = about_highest_hz(&angles, &times_s, self.sampling.frequencies_hz);
+        let within_hz = about_highest_hz(&angles, &times_s, self.limits.frequencies_hz);
         let turn = Driven::new(&[angles], &[], &times_s, Vec::new(), within_hz)?;
         let fit = turn.likeliest(MOST_OF_TRUNK, self.cancel)?;
         let mut all = fit.oscillators();
@@ -313,7 +312,8 @@ impl InWind<'_> {
         carrier: &Points,
         criteria: &AcceptanceCriteria,
     ) -> Result<Estimate, Unidentified> {
-        let frames = self.sampling.frames_with(&[points, carrier])?;
+        let frames = frames_with(self.film, &[points, carrier], MIN_FRAMES);
+        let frames = frames.ok_or(Unidentified::TooShort)?;
         let ancestors = self.ancestors(branch);
         let motion = OwnMotion::of(points, carrier, &frames)?;
         let times_s = self.film.times_of(&frames);
@@ -322,7 +322,7 @@ impl InWind<'_> {
             &motion.carried,
             &times_s,
             ancestors.iter().map(|a| a.mode).collect(),
-            self.sampling.frequencies_hz,
+            self.limits.frequencies_hz,
         );
         let driven = driven.ok_or(Unidentified::TooShort)?;
         let fitted = driven.likeliest(MOST_OF_BRANCH, self.cancel);
@@ -335,7 +335,7 @@ impl InWind<'_> {
             return Err(Unidentified::TooUncertain);
         }
         let shares = fitted.shares(k, motion.noise_px2_per_hz(&times_s));
-        let own = Spectrum::of(&motion.own, &times_s, self.sampling.frequencies_hz);
+        let own = Spectrum::of(&motion.own, &times_s, self.limits.frequencies_hz);
         check_one_swing(&own, &shares, criteria)?;
         // Gusts are not known well enough for a likelihood to tell a frequency from its mirror
         // image at such a rate.
@@ -392,8 +392,8 @@ struct OwnMotion {
 }
 
 impl OwnMotion {
-    /// In some frames, each some neighbours taken together; the reason where there is none.
-    fn of(points: &Points, carrier: &Points, frames: &[Vec<usize>]) -> Result<Self, Unidentified> {
+    /// In some frames; the reason where there is none.
+    fn of(points: &Points, carrier: &Points, frames: &[usize]) -> Result<Self, Unidentified> {
         let GapFree {
             signals: all,
             noise,

@@ -71,21 +71,24 @@ pub fn rms(values: impl IntoIterator<Item = f64>) -> f64 {
     (sum / f64::from(count.max(1))).sqrt()
 }
 
-/// Variance of white noise in some signals, from their third differences, in which a smooth motion
-/// leaves little. Values that are no numbers are left out; 0 where there are too few.
+/// Variance of white noise in some signals, from their sixth differences, in which a motion of up to
+/// a fifth of the rate leaves little. Values that are no numbers are left out; 0 where there are too
+/// few.
 pub fn noise_variance<'a>(signals: impl IntoIterator<Item = &'a [f64]>) -> f64 {
+    const DIFFERENCE: [f64; 7] = [1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0];
     let (mut squares, mut count) = (0.0, 0_u32);
     for signal in signals {
-        for w in signal.windows(4) {
-            let third = w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0];
-            if third.is_finite() {
-                squares += third * third;
+        for window in signal.windows(DIFFERENCE.len()) {
+            let terms = window.iter().zip(DIFFERENCE);
+            let difference: f64 = terms.map(|(x, weight)| x * weight).sum();
+            if difference.is_finite() {
+                squares += difference * difference;
                 count += 1;
             }
         }
     }
-    // The squares of 1, 3, 3, 1 make 20.
-    squares / (20.0 * f64::from(count.max(1)))
+    let of_white: f64 = DIFFERENCE.iter().map(|weight| weight * weight).sum();
+    squares / (of_white * f64::from(count.max(1)))
 }
 
 #[cfg(test)]

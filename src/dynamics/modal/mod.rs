@@ -16,7 +16,7 @@ mod search;
 mod tree;
 
 use super::branch_tree::BranchTree;
-use super::branches::{BELOW_NYQUIST, BranchMode, LnDeviations, SearchLimits};
+use super::branches::{BranchMode, LnDeviations, SearchLimits};
 use super::film::Film;
 use super::free_decay::MIN_PERIODS;
 use super::point_modes::{PointMode, PointModes, mode_of};
@@ -24,7 +24,7 @@ use super::release::Onset;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying};
-use points::ThinnedFilm;
+use points::BridgedFilm;
 use read::ModeEstimate;
 use search::MIN_POINTS;
 use tree::{Branch, Decay, Tree};
@@ -65,24 +65,20 @@ pub(super) fn point_modes(
     if !sways.get(trunk.index()).is_some_and(Result::is_ok) {
         return None;
     }
-    let thinned = ThinnedFilm::of(film, onset);
-    let span_s = thinned.span_s();
-    if thinned.points.len() < MIN_POINTS || span_s <= 0.0 {
+    let bridged = BridgedFilm::of(film, onset.at_s);
+    let span_s = bridged.span_s();
+    if bridged.points.len() < MIN_POINTS || span_s <= 0.0 {
         return None;
     }
-    let below_nyquist_hz = 0.5 * BELOW_NYQUIST * thinned.rate_hz();
-    let frequencies_hz = Bounds::new(
-        MIN_PERIODS / span_s,
-        below_nyquist_hz.min(limits.frequencies_hz.hi),
-    );
+    let frequencies_hz = Bounds::new(MIN_PERIODS / span_s, limits.frequencies_hz.hi);
     if frequencies_hz.is_empty() {
         return None;
     }
-    let ThinnedFilm {
+    let BridgedFilm {
         times_s,
         points,
         tracks,
-    } = thinned;
+    } = bridged;
     let decay = Decay::new(times_s, onset.start, frequencies_hz, points);
     let nodes = tracks.iter().map(|&k| film.tracks[k].node);
     let branch_of: Vec<usize> = nodes.map(NodeId::index).collect();
@@ -406,7 +402,7 @@ mod tests {
     #[test]
     fn a_film_that_carries_nothing_shows_none() {
         let (skeleton, mut film) = filmed(&[(1.1, &[4.0; 6]), (1.4, &[4.0; 6])]);
-        let short = film.until(20).into_owned();
+        let short = film.part(0..20).into_owned();
         assert!(groups(&skeleton, &short).is_empty());
         film.tracks.iter_mut().for_each(|t| t.at_px.fill(NOT_SEEN));
         assert!(groups(&skeleton, &film).is_empty());

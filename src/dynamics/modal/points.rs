@@ -1,24 +1,19 @@
-//! The points of a film for the analysis of all branches at once: thinned, and without gaps.
+//! The points of a film for the analysis of all branches at once, without gaps.
 
-use super::super::film::{Film, FilmTrack, NOT_SEEN};
+use super::super::film::Film;
 use super::super::members::{count_seen, is_seen, mean_px};
-use super::super::release::Onset;
 use super::tree::Point;
 use crate::signal::interpolation::linear;
 use nalgebra::Point2;
 
-/// Frames a second that are enough: neighbours are taken together as their mean.
-const ENOUGH_HZ: f64 = 15.0;
-/// Share of a frame by which a camera's rate may be off.
-const RATE_TOLERANCE: f64 = 0.01;
-/// And what comes later after a release says little, s.
+/// What comes later after a release says little, s.
 const ENOUGH_S: f64 = 20.0;
 /// A point must have been seen in this share of the frames.
 const MIN_SEEN_SHARE: f64 = 0.8;
 const MIN_NOISE_PX: f64 = 0.03;
 
-/// A film from its release on.
-pub(super) struct ThinnedFilm {
+/// A film from its release on, with short gaps bridged by straight lines: to find whose a mode is.
+pub(super) struct BridgedFilm {
     /// From the release on, s.
     pub times_s: Vec<f64>,
     /// Those that were seen nearly always.
@@ -27,29 +22,20 @@ pub(super) struct ThinnedFilm {
     pub tracks: Vec<usize>,
 }
 
-impl ThinnedFilm {
-    /// Neighbouring frames are taken together, so that no fewer than enough are left, and short
-    /// gaps bridged by straight lines: to tell whose a mode is.
-    pub fn of(film: &Film, onset: &Onset) -> Self {
-        let together = ((film.frames_per_period(ENOUGH_HZ) + RATE_TOLERANCE) as usize).max(1);
-        let until = film
-            .times_s
-            .partition_point(|t| *t <= onset.at_s + ENOUGH_S);
-        let mut rows = film.neighbours(onset.from..until, together);
-        rows.retain(|row| row.len() == together);
+impl BridgedFilm {
+    /// Of a film from its release at `at_s` on.
+    pub fn of(film: &Film, at_s: f64) -> Self {
+        let until = film.times_s.partition_point(|t| *t <= at_s + ENOUGH_S);
         let mut out = Self {
-            times_s: rows
-                .iter()
-                .map(|row| film.mean_s(row) - onset.at_s)
-                .collect(),
+            times_s: film.times_s[..until].iter().map(|t| t - at_s).collect(),
             points: Vec::new(),
             tracks: Vec::new(),
         };
         for (k, track) in film.tracks.iter().enumerate() {
-            let at_px: Vec<Point2<f64>> = rows.iter().map(|row| mean_of_all(track, row)).collect();
-            if let Some(values) = bridged(&out.times_s, &at_px) {
+            let at_px = &track.at_px[..until];
+            if let Some(values) = bridged(&out.times_s, at_px) {
                 out.points
-                    .push(Point::new(values, mean_px(&at_px), MIN_NOISE_PX));
+                    .push(Point::new(values, mean_px(at_px), MIN_NOISE_PX));
                 out.tracks.push(k);
             }
         }
@@ -59,20 +45,6 @@ impl ThinnedFilm {
     pub fn span_s(&self) -> f64 {
         let ends = self.times_s.last().zip(self.times_s.first());
         ends.map_or(0.0, |(last, first)| last - first)
-    }
-
-    pub fn rate_hz(&self) -> f64 {
-        (self.times_s.len() - 1) as f64 / self.span_s()
-    }
-}
-
-/// Mean place in some frames, px; not seen where one of them does not show it.
-fn mean_of_all(track: &FilmTrack, frames: &[usize]) -> Point2<f64> {
-    let at_px: Vec<Point2<f64>> = frames.iter().map(|&k| track.at_px[k]).collect();
-    if at_px.iter().all(is_seen) {
-        mean_px(&at_px)
-    } else {
-        NOT_SEEN
     }
 }
 

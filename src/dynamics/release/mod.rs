@@ -14,13 +14,15 @@ use super::decay::Start;
 use super::decaying_motions::{DecayingMotions, MAX_NOISE_SHARE};
 use super::film::Film;
 use super::members::{Points, evenly_chosen};
+use super::sampling;
 use super::signals::Signals;
 use crate::bounds::Bounds;
 use crate::cancel::CancelToken;
 use crate::model::Excitation;
 pub use fading::fades_as_a_free_decay;
-use motion::{Motion, greatest_motion};
+use motion::greatest_motion;
 use repeated::{REST_S, parts};
+use std::borrow::Cow;
 
 /// Points that are looked at.
 const MAX_POINTS: usize = 24;
@@ -43,7 +45,7 @@ const MAX_RSS_FROM_REST: f64 = 1.3;
 /// At least this share of the noise counts as left by a free fit.
 const MIN_LEFT_OF_NOISE: f64 = 0.1;
 /// Standard deviation of the moment of a release, in frames, before all modes have their say in it.
-pub(super) const RELEASE_SD_FRAMES: f64 = 0.7;
+const RELEASE_SD_FRAMES: f64 = 0.7;
 /// A film's last part tells whether it is a decay or wind if it is so long, s: before, a slow tree
 /// has hardly died down.
 const TELLS_S: f64 = 10.0;
@@ -71,25 +73,47 @@ pub struct Onset {
     pub to: usize,
 }
 
+/// When the tree was released, s, and the standard deviation of that.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ReleaseTime {
+    pub at_s: f64,
+    pub sd_s: f64,
+}
+
 /// What made a film's tree sway, and what was worked out on the way to that.
-pub(super) struct FoundOnset {
+pub(super) struct FoundOnset<'a> {
     pub onset: Onset,
+    pub release: ReleaseTime,
+    /// The frames that are used, in means of neighbours.
+    pub film: Cow<'a, Film>,
     /// Where there are several releases, when each was, s.
     pub releases_s: Vec<f64>,
     /// After a release the motions of all points; `None` where there are too few frames, and in wind.
     pub decaying: Option<DecayingMotions>,
 }
 
-impl FoundOnset {
-    fn wind(film: &Film) -> Self {
+impl ReleaseTime {
+    fn of(at_s: f64, film: &Film) -> Self {
         Self {
-            onset: Onset {
-                excitation: Excitation::Wind,
-                start: Start::Moving,
-                at_s: film.times_s.first().copied().unwrap_or(0.0),
-                from: 0,
-                to: film.times_s.len(),
-            },
+            at_s,
+            sd_s: RELEASE_SD_FRAMES * film.step_s(),
+        }
+    }
+}
+
+impl<'a> FoundOnset<'a> {
+    fn wind(film: &'a Film, highest_hz: f64) -> Self {
+        let onset = Onset {
+            excitation: Excitation::Wind,
+            start: Start::Moving,
+            at_s: film.times_s.first().copied().unwrap_or(0.0),
+            from: 0,
+            to: film.times_s.len(),
+        };
+        Self {
+            release: ReleaseTime::of(onset.at_s, film),
+            onset,
+            film: sampling::of_wind(film, highest_hz),
             releases_s: Vec::new(),
             decaying: None,
         }
@@ -100,13 +124,13 @@ impl FoundOnset {
 /// lie within `frequencies_hz`. Where the tree was released several times, each from rest, it is
 /// the time with the greatest motion, until the next pull. Nothing is to be made of it where
 /// `cancel` has ended it.
-pub(super) fn onset(
-    film: &Film,
+pub(super) fn onset<'a>(
+    film: &'a Film,
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> FoundOnset {
+) -> FoundOnset<'a> {
     if given != Some(Excitation::Wind)
         && let Some(found) = of_parts(film, tracks, given, frequencies_hz, cancel)
     {
@@ -123,7 +147,7 @@ fn of_parts(
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> Option<FoundOnset> {
+) -> Option<FoundOnset<'static>> {
     let mut greatest: Option<(f64, FoundOnset)> = None;
     let mut times_s = Vec::new();
     for frames in parts(film) {
@@ -143,11 +167,15 @@ fn of_parts(
             continue;
         }
         times_s.push(onset.at_s);
-        let motion = of_some(&part.until(onset.to), tracks, onset.from).squares();
+        let motion = of_some(&found.film, tracks).squares();
         if greatest.as_ref().is_none_or(|(most, _)| motion >= *most) {
             let [from, to] = [onset.from, onset.to].map(|k| frames.start + k);
-            let onset = Onset { from, to, ..onset };
-            greatest = Some((motion, FoundOnset { onset, ..found }));
+            let found = FoundOnset {
+                onset: Onset { from, to, ..onset },
+                film: Cow::Owned(found.film.into_owned()),
+                ..found
+            };
+            greatest = Some((motion, found));
         }
     }
     let (_, greatest) = greatest?;
@@ -161,26 +189,27 @@ fn of_parts(
 }
 
 /// Of a film with one release at most.
-fn of_one(
-    film: &Film,
+fn of_one<'a>(
+    film: &'a Film,
     tracks: &[usize],
     given: Option<Excitation>,
     frequencies_hz: Bounds,
     cancel: &CancelToken,
-) -> FoundOnset {
-    let whole = of_some(film, tracks, 0);
+) -> FoundOnset<'a> {
+    let whole = of_some(film, tracks);
     if given == Some(Excitation::Wind) || whole.tracks.is_empty() {
-        return FoundOnset::wind(film);
+        return FoundOnset::wind(film, frequencies_hz.hi);
     }
     let motion = greatest_motion(film, &whole);
     // What comes after it has died down must not come back either.
-    let later = since(film, &motion);
-    let energy_ratio = energy_ratio(&of_some(film, tracks, motion.from), &later);
-    let (whole_film, film) = (film, &film.until(motion.to));
+    let later = film.part(motion.from..film.times_s.len());
+    let energy_ratio = energy_ratio(&of_some(&later, tracks), &later.times_s);
+    let used = sampling::of_release(film, motion.from..motion.to, frequencies_hz.hi);
+    let release = ReleaseTime::of(motion.at_s, film);
     let decay = Decay {
-        points: of_some(film, tracks, motion.from),
-        times_s: since(film, &motion),
-        release_sd_s: RELEASE_SD_FRAMES * film.step_s(),
+        points: of_some(&used, tracks),
+        times_s: used.times_s.iter().map(|t| t - release.at_s).collect(),
+        release_sd_s: release.sd_s,
         frequencies_hz,
         cancel,
     };
@@ -190,19 +219,19 @@ fn of_one(
         FROM_MOTION
     };
     let dies_down = energy_ratio < criteria.max_energy_ratio;
-    if decay.times_s.len() < MIN_FRAMES
+    if motion.to - motion.from < MIN_FRAMES
         || decay.points.tracks.is_empty()
         || given.is_none() && !dies_down
     {
-        return FoundOnset::wind(whole_film);
+        return FoundOnset::wind(film, frequencies_hz.hi);
     }
-    let decaying = DecayingMotions::since(motion.from, film, tracks);
+    let decaying = DecayingMotions::of(&used, tracks);
     if given.is_none() {
-        let left = decaying.as_ref().and_then(|motions| {
-            motions.share_left(MODES_OF_ALL, motion.at_s, frequencies_hz, cancel)
-        });
+        let left = decaying
+            .as_ref()
+            .and_then(|motions| motions.share_left(MODES_OF_ALL, &release, frequencies_hz, cancel));
         if left.is_none_or(|left| left > criteria.max_left) {
-            return FoundOnset::wind(whole_film);
+            return FoundOnset::wind(film, frequencies_hz.hi);
         }
     }
     FoundOnset {
@@ -217,15 +246,11 @@ fn of_one(
             from: motion.from,
             to: motion.to,
         },
+        release,
+        film: used,
         releases_s: Vec::new(),
         decaying,
     }
-}
-
-/// Times from the begin of a motion on, s.
-fn since(film: &Film, motion: &Motion) -> Vec<f64> {
-    let times_s = film.times_s[motion.from..].iter();
-    times_s.map(|t| t - motion.at_s).collect()
 }
 
 /// What may be a free decay.
@@ -270,8 +295,8 @@ impl Decay<'_> {
 }
 
 /// Some of the points.
-fn of_some(film: &Film, tracks: &[usize], from: usize) -> Points {
-    Points::of(film, &evenly_chosen(tracks, MAX_POINTS), from)
+fn of_some(film: &Film, tracks: &[usize]) -> Points {
+    Points::of(film, &evenly_chosen(tracks, MAX_POINTS))
 }
 
 /// Energy of the last third of some signals against that of the first.
