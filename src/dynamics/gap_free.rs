@@ -146,6 +146,8 @@ impl GapFree {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::generator;
+    use rand::RngExt;
 
     fn arm(i: usize) -> f64 {
         1.0 + i as f64
@@ -155,17 +157,17 @@ mod tests {
         (0.21 * k as f64).sin()
     }
 
-    fn noise(k: usize, i: usize) -> f64 {
-        0.05 * ((k * 131 + i * 977) as f64).sin()
-    }
-
     /// A point that is lost for a while moves there as its neighbours say, and not as if it stood
     /// still.
     #[test]
     fn a_gap_is_filled_by_what_the_others_do() {
-        let mut signals: Vec<Vec<f64>> = (0..8)
-            .map(|i| (0..300).map(|k| arm(i) * sway(k) + noise(k, i)).collect())
-            .collect();
+        let mut random = generator(1, 0);
+        let mut signals = vec![vec![0.0; 300]; 8];
+        for (i, signal) in signals.iter_mut().enumerate() {
+            for (k, value) in signal.iter_mut().enumerate() {
+                *value = arm(i) * sway(k) + random.random_range(-0.06..0.06);
+            }
+        }
         (100..160).for_each(|k| (6..8).for_each(|i| signals[i][k] = f64::NAN));
         let points = Points {
             tracks: (0..4).collect(),

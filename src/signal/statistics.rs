@@ -117,8 +117,8 @@ mod tests {
             .map(|k| 30.0 * (0.02 * k as f64).sin() + alternating(k))
             .collect();
         signal[50] = f64::NAN;
-        // Alternating noise has third differences of 8 times itself, white noise of √20.
-        let wanted = 64.0 * 0.01 / 20.0;
+        // Alternating noise has sixth differences of 64 times itself, white noise of √924.
+        let wanted = 4096.0 * 0.01 / 924.0;
         let found = noise_variance([signal.as_slice()]);
         assert!((found / wanted - 1.0).abs() < 0.01, "{found}, not {wanted}");
         assert_eq!(noise_variance([[1.0, 2.0].as_slice()]), 0.0);

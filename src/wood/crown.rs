@@ -4,7 +4,7 @@
 use super::colours::colour_at;
 use super::contrast::Around;
 use super::foliage::Foliage;
-use super::mask::Parts;
+use super::joined::Parts;
 use super::photograph::{NotSeen, Photograph};
 use super::{paths, widened};
 use crate::model::{BranchGraph, Outline, Size};

@@ -3,7 +3,7 @@
 //! The paper has one photograph and the user's strokes. Here the film's motion is in their place:
 //! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
-//! [`mask`] classifies pixels as wood or not by colour; [`paths`], or [`circles`] as in the paper,
+//! [`mask`] classifies pixels as wood or not by colour ([`bark_colour`], [`leaves`]) and by [`ridges`]; [`paths`], or [`circles`] as in the paper,
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
 //! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
 //! strokes in place of motion; [`foliage`] finds its leaves, and [`contrast`] says whether a stroke is on
@@ -11,21 +11,27 @@
 //! [`greenery`].
 
 mod bark;
+mod bark_colour;
 mod circles;
 mod colours;
 mod contrast;
 mod crossings;
 mod crown;
 mod cut;
+mod drawing;
 mod evidence;
 mod faint;
 mod foliage;
 mod greenery;
+mod joined;
+mod leaves;
 mod mask;
 mod mixture;
+mod part;
 mod paths;
 mod photograph;
 mod probability;
+mod ridges;
 mod steady;
 mod stroke_colours;
 

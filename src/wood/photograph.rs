@@ -8,8 +8,12 @@
 
 use super::colours::colour_at;
 use super::cut::{SURE, least_cut};
+use super::drawing;
 use super::foliage::{Foliage, InCrown, LeafColour};
-use super::mask::{self, Part, WoodMask};
+use super::joined::{wide, without_specks};
+use super::mask::{self, WoodMask};
+use super::part::Part;
+use super::ridges::ridges;
 use super::stroke_colours::StrokeColours;
 use super::{Stroke, bark, circles, crown, faint, paths, probability, widened};
 use crate::cancel::CancelToken;
@@ -105,7 +109,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     let foot_px = trunk.ok_or(NotSeen::Wood)?;
     let within = widened(&photo.crown.mask, size, FREEDOM_PX)?;
     let colour = photo.leaf_colour.unwrap_or_default();
-    let is_stroke = mask::on_lines(photo.strokes, size, mask::STROKE_PX)?;
+    let is_stroke = drawing::on_lines(photo.strokes, size, drawing::STROKE_PX)?;
     let in_crown = InCrown {
         picture: photo.picture,
         region: &within,
@@ -191,7 +195,7 @@ fn wood_mask(
     let is_inside: Vec<bool> = region.iter().map(|m| *m != 0).collect();
     let is_ridge = match in_leaf {
         true => Vec::new(),
-        false => mask::ridges(&bgr, bounds, &is_inside, size)?,
+        false => ridges(&bgr, bounds, &is_inside, size)?,
     };
     let mut odds = vec![0.0; size.area()];
     for i in (0..size.area()).filter(|i| is_inside[*i]) {
@@ -214,12 +218,12 @@ fn wood_mask(
         out.mask[i] = 255;
     }
     if in_leaf {
-        let is_wide = mask::wide(&out.mask, size)?;
+        let is_wide = wide(&out.mask, size)?;
         for (i, mask) in out.mask.iter_mut().enumerate() {
             *mask = if is_wide[i] || is_stroke[i] { *mask } else { 0 };
         }
     }
-    mask::without_specks(&mut out.mask, size)?;
+    without_specks(&mut out.mask, size)?;
     without_thick(&mut out.mask, &photo.strokes[0], size)?;
     for (mask, is_stroke) in out.mask.iter_mut().zip(is_stroke) {
         *mask = if *is_stroke { 255 } else { *mask };
@@ -317,7 +321,7 @@ fn with_strokes(crown: &Outline, widened: &[u8], strokes: &[Stroke]) -> opencv::
         fill_convex_poly(&mut mask, &hull, white, LINE_8, 0)?;
     }
     for stroke in strokes {
-        mask::draw_line(&mut mask, stroke, white, wide_px)?;
+        drawing::draw_line(&mut mask, stroke, white, wide_px)?;
     }
     Ok(mask.data_bytes()?.to_vec())
 }

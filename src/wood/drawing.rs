@@ -1,0 +1,52 @@
+//! Lines that are drawn into masks.
+
+use super::Stroke;
+use super::mask::WoodMask;
+use crate::model::Size;
+use nalgebra::Point2;
+use opencv::core::{CV_8U, Mat, Point, Scalar, Vector};
+use opencv::imgproc::{LINE_8, polylines};
+use opencv::prelude::*;
+
+/// Width of a stroke, px.
+pub(super) const STROKE_PX: i32 = 2;
+/// Strokes are drawn no farther than this from the first pixel, px: whole numbers hold it.
+const FARTHEST: f64 = 30_000.0;
+/// Places of lines are given to OpenCV in parts of a pixel, so many bits of them.
+const PIXEL_BITS: i32 = 4;
+
+/// Which pixels of the mask `wood` the strokes are drawn on.
+pub(super) fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
+    let mut lines: Vec<Stroke> = Vec::with_capacity(strokes.len());
+    for stroke in strokes {
+        lines.push(stroke.iter().map(|at| wood.to_mask(*at)).collect());
+    }
+    on_lines(&lines, wood.size, STROKE_PX * wood.scale as i32)
+}
+
+/// Which pixels of a picture of this `size` lines of this width (px) are drawn on.
+pub(super) fn on_lines(lines: &[Stroke], size: Size, width_px: i32) -> opencv::Result<Vec<bool>> {
+    let (rows, cols) = (size.height as i32, size.width as i32);
+    let mut mask = Mat::zeros(rows, cols, CV_8U)?.to_mat()?;
+    for line in lines {
+        draw_line(&mut mask, line, Scalar::all(1.0), width_px)?;
+    }
+    Ok(mask.data_bytes()?.iter().map(|m| *m != 0).collect())
+}
+
+/// Draws a line of this width, px. Its places are not rounded to pixels: one that is drawn half a pixel
+/// beside another covers nearly the same.
+pub(super) fn draw_line(
+    mask: &mut Mat,
+    places: &[Point2<f64>],
+    colour: Scalar,
+    width_px: i32,
+) -> opencv::Result<()> {
+    let parts = f64::from(1 << PIXEL_BITS);
+    let mut corners = Vector::<Point>::new();
+    for at in places {
+        let [u, v] = [at.x, at.y].map(|c| (parts * c.clamp(-FARTHEST, FARTHEST)).round() as i32);
+        corners.push(Point::new(u, v));
+    }
+    polylines(mask, &corners, false, colour, width_px, LINE_8, PIXEL_BITS)
+}
