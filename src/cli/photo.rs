@@ -338,6 +338,13 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
                 .to_owned(),
         );
     }
+    if tree.seen.is_as_around {
+        warnings.push(
+            "the leaves have the colours of what is around the crown: look whether its stroke is round the \
+             tree, and not on a lawn or a hedge"
+                .to_owned(),
+        );
+    }
     for index in &tree.seen.doubtful {
         warnings.push(format!(
             "along stroke {} hardly anything is seen that differs from what is at both its sides: it is a \

@@ -1,7 +1,7 @@
 //! A tree is grown from the branches that a picture shows, by subtrees of a library on ever more of
 //! its branches (Tan et al. 2008 sect. 3).
 //!
-//! Each round takes some branches, thick and old ones first, tries all subtrees on them in twelve
+//! Each round takes some branches, old ones more often, tries all subtrees on them in twelve
 //! turns, and keeps the one that brings the attractors nearest: in the picture and in space in turns.
 //! What would leave the tree in the picture, or its room in space, or come too near to a branch is
 //! pruned before it counts.
@@ -259,26 +259,21 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Branches that are tried: through all from the thickest on, each taken with a probability of one
-    /// by its generation.
+    /// Branches that are tried, drawn with a probability of one by its generation (Efraimidis and Spirakis
+    /// 2006). The paper goes through all from the thickest on, and the first eight that chance takes are
+    /// nearly always low ones: the top stays empty.
     fn chosen(&self, random: &mut Generator) -> Vec<usize> {
-        let mut by_radius: Vec<usize> = (0..self.branches.len())
-            .filter(|b| self.vector(*b).norm() >= SHORTEST * self.height_px)
-            .filter(|b| self.branches[*b].generation < MOST_GENERATIONS)
-            .collect();
-        let radius = |b: usize| self.joints[self.branches[b].end].radius;
-        by_radius.sort_by(|a, b| radius(*b).total_cmp(&radius(*a)).then(a.cmp(b)));
-        let mut chosen = Vec::with_capacity(CANDIDATES);
-        for branch in by_radius {
-            if chosen.len() == CANDIDATES {
-                break;
-            }
-            let generation = self.branches[branch].generation;
-            if random.random_range(0..generation.max(1)) == 0 {
-                chosen.push(branch);
+        let mut drawn: Vec<(usize, f64)> = Vec::new();
+        for (b, branch) in self.branches.iter().enumerate() {
+            let is_long = self.vector(b).norm() >= SHORTEST * self.height_px;
+            if is_long && branch.generation < MOST_GENERATIONS {
+                let key = random.random_range(0.0_f64..1.0);
+                drawn.push((b, key.powi(branch.generation.max(1) as i32)));
             }
         }
-        chosen
+        drawn.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        drawn.truncate(CANDIDATES);
+        drawn.into_iter().map(|(b, _)| b).collect()
     }
 
     /// From where a branch begins to its end.

@@ -13,8 +13,8 @@ use crate::model::{BranchGraph, Outline, Size};
 /// photographs it is 7.1 to 23, on 24 places of their lawns 3.5 at most (even seeds of 36002 to 36006, 38002,
 /// 38006, 39002); beside a tree of the same kind it is less than 5.
 const LEAST_CROWN_DEVIATIONS: f64 = 3.5;
-/// A crown without leaves holds branches of this length at least, by its own size (the root of its area),
-/// and one in leaf is no farther from the trunk than so much of it.
+/// A crown without leaves, or with such as are around it, holds branches of this length at least, by its own
+/// size (the root of its area), and one in leaf is no farther from the trunk than so much of it.
 const LEAST_WOOD: f64 = 0.5;
 const FARTHEST_CROWN: f64 = 0.25;
 /// Leaves nearer to each other than twice this share of the picture's width are one piece, and pieces
@@ -38,29 +38,34 @@ pub fn deviations(photo: &Photograph, foliage: &Foliage) -> opencv::Result<Optio
     Ok(around.deviations(|i| foliage.odds.believed(&colour_at(photo.picture, i))))
 }
 
-/// Refuses leaves that do not differ from what is around the crown by so many standard errors: a lawn, or a
-/// hedge.
-pub fn refuse_like_rest(deviations: Option<f64>) -> Result<(), NotSeen> {
-    match deviations {
-        Some(deviations) if deviations < LEAST_CROWN_DEVIATIONS => Err(NotSeen::Leaves),
-        _ => Ok(()),
-    }
-}
-
 /// How far off the crown each pixel is, px; 0 within it.
 fn off_px(crown: &Outline) -> opencv::Result<Vec<f32>> {
     let inverse: Vec<u8> = crown.mask.iter().map(|m| 255 - m).collect();
     paths::distances(&inverse, crown.size)
 }
 
-/// Refuses a crown that is not that of these branches: a bare one in which hardly any of them are, or
-/// one in leaf that is apart from them.
-pub fn refuse_other(crown: &Outline, branches: &BranchGraph, in_leaf: bool) -> Result<(), NotSeen> {
-    if !in_leaf {
-        return match wood_share(crown, branches) < LEAST_WOOD {
-            true => Err(NotSeen::Crown),
-            false => Ok(()),
-        };
+/// Whether what is within a crown may be a lawn or a hedge: it does not differ from what is around it by so
+/// many standard errors.
+pub fn is_as_around(deviations: Option<f64>) -> bool {
+    deviations.is_some_and(|by| by < LEAST_CROWN_DEVIATIONS)
+}
+
+/// Refuses a crown that is not that of these branches. One whose leaves are as what is around it must hold
+/// branches, as one without leaves does, and not the trunk's foot. A crown in leaf must not be apart from them.
+pub fn refuse_other(
+    crown: &Outline,
+    branches: &BranchGraph,
+    in_leaf: bool,
+    is_as_around: bool,
+) -> Result<(), NotSeen> {
+    let holds_wood = wood_share(crown, branches) >= LEAST_WOOD;
+    let foot = branches.nodes.first().map(|foot| foot.position_px);
+    let holds_foot = foot.is_some_and(|at| crown.contains(at.x, at.y));
+    match (in_leaf, is_as_around) {
+        (false, _) if !holds_wood => return Err(NotSeen::Crown),
+        (true, true) if !holds_wood || holds_foot => return Err(NotSeen::Leaves),
+        (false, _) => return Ok(()),
+        (true, _) => {}
     }
     let size = crown.size;
     let off_px = off_px(crown)?;
@@ -96,4 +101,43 @@ pub fn without_far_pieces(mut leaves: Vec<u8>, size: Size) -> opencv::Result<Vec
         *leaf = if is_small { 0 } else { *leaf };
     }
     Ok(leaves)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::WoodNode;
+
+    /// A square of 40 px whose lower edge is at row 60.
+    fn crown() -> Outline {
+        let size = Size::new(100, 100);
+        let mut mask = vec![0; size.area()];
+        for v in 20..60 {
+            mask[v * 100 + 30..v * 100 + 70].fill(255);
+        }
+        Outline {
+            size,
+            mask,
+            polygon_px: Vec::new(),
+            matte: None,
+        }
+    }
+
+    fn branch(from_v: f64, to_v: f64) -> BranchGraph {
+        let mut graph = BranchGraph::default();
+        for (parent, v) in [(None, from_v), (Some(0), to_v)] {
+            graph.nodes.push(WoodNode::made_up(parent, 50.0, v));
+        }
+        graph
+    }
+
+    #[test]
+    fn leaves_as_around_are_a_tree_s_where_its_wood_is_in_them_and_its_foot_is_not() {
+        let refused = |graph: &BranchGraph| refuse_other(&crown(), graph, true, true).is_err();
+        assert!(!refused(&branch(90.0, 25.0)), "a trunk into the crown");
+        assert!(refused(&branch(90.0, 50.0)), "hardly any wood in it");
+        assert!(refused(&branch(55.0, 22.0)), "the foot in it");
+        let differs = refuse_other(&crown(), &branch(90.0, 50.0), true, false);
+        assert!(differs.is_ok(), "leaves that differ");
+    }
 }

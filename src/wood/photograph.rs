@@ -73,6 +73,8 @@ pub struct SeenInPhotograph {
     /// The strokes, by their place among all, along which nothing is seen that differs from what is beside
     /// them.
     pub doubtful: Vec<usize>,
+    /// The leaves have the colours of what is around the crown, as those of a lawn do.
+    pub is_as_around: bool,
 }
 
 /// Why a photograph does not show what was drawn on it.
@@ -119,10 +121,10 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     if cancel.is_cancelled() {
         return Err(NotSeen::Cancelled);
     }
-    let mut crown_deviations = None;
+    let mut is_as_around = false;
     let leaves = match foliage {
         Some(foliage) => {
-            crown_deviations = crown::deviations(&photo, &foliage)?;
+            is_as_around = crown::is_as_around(crown::deviations(&photo, &foliage)?);
             crown::without_far_pieces(foliage.mask, size)?
         }
         None => vec![0; size.area()],
@@ -131,7 +133,6 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     if let (Some(colour), false) = (photo.leaf_colour, in_leaf) {
         return Err(NotSeen::LeavesOf(colour));
     }
-    crown::refuse_like_rest(crown_deviations)?;
     let region = with_strokes(photo.crown, &within, photo.strokes)?;
     let empty = without_wood(size, &leaves);
     let on_strokes = StrokeColours::of(photo, is_stroke, &region, &empty.is_leaf)?;
@@ -147,7 +148,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     if branches.nodes.len() < 2 {
         return Err(NotSeen::Wood);
     }
-    crown::refuse_other(photo.crown, &branches, mask.in_leaf)?;
+    crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
     hide_radii(&mut branches, &leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -174,6 +175,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         tree,
         trunk_deviations: on_strokes.trunk_deviations,
         doubtful: on_strokes.doubtful,
+        is_as_around: mask.in_leaf && is_as_around,
     })
 }
 
