@@ -103,6 +103,11 @@ impl Growth<'_> {
         }
     }
 
+    fn has_child_at(&self, node: usize, at: &Point3<f64>) -> bool {
+        let mut children = self.children[node].iter();
+        children.any(|c| (self.tree.nodes[*c as usize].at - at).norm() < SAME_CHILD * self.step)
+    }
+
     /// One round. Returns whether anything grew.
     fn grow(&mut self) -> bool {
         let mut pulls: Vec<Vector3<f64>> = vec![Vector3::zeros(); self.tree.nodes.len()];
@@ -118,10 +123,7 @@ impl Growth<'_> {
                 continue;
             };
             let at = self.tree.nodes[node].at + along * self.step;
-            let is_there = |child: &u32| {
-                (self.tree.nodes[*child as usize].at - at).norm() < SAME_CHILD * self.step
-            };
-            if !self.children[node].iter().any(is_there) {
+            if !self.has_child_at(node, &at) {
                 self.add(Some(node), at);
             }
         }

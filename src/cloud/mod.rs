@@ -144,7 +144,7 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
         for (point, thinned) in standing.of_cloud.iter().zip(&coarse.thinned.of_point) {
             found.tree_of_point[*point as usize] = (*thinned != u32::MAX).then_some(0);
         }
-        let linked = Linked::of(coarse.thinned, cell, GAP_SHARE * standing.height);
+        let linked = coarse.bridged(GAP_SHARE * standing.height);
         found
             .trees
             .push(tree_of(&standing, linked, options, figures));
@@ -199,11 +199,21 @@ impl Linked {
 
     /// Gaps are led over up to `widest`.
     fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
-        let graph = Graph::new(&thinned.points, REACH_CELLS * cell, widest);
+        let graph = Graph::new(&thinned.points, REACH_CELLS * cell);
         Self {
             thinned,
             cell,
             graph,
+        }
+        .bridged(widest)
+    }
+
+    /// The same with wider gaps led over.
+    fn bridged(self, widest: f32) -> Self {
+        let reach = REACH_CELLS * self.cell;
+        Self {
+            graph: self.graph.bridged(&self.thinned.points, reach, widest),
+            ..self
         }
     }
 
@@ -313,16 +323,15 @@ impl Standing {
                 least: LEAST_POINTS,
             });
         }
-        let bounds = [0, 1, 2].map(|axis| Extent::of(all, axis));
-        let [wide, deep, height] = bounds.map(|b| b.size);
+        let bounds = Bounds::of(all);
+        let [wide, deep, height] = bounds.sizes();
         if height <= 0.0 || wide.max(deep) <= 0.0 {
             return Err(CloudError::Flat);
         }
-        let is_near = |p: &Point3<f32>| bounds.iter().zip(p.iter()).all(|(b, x)| b.holds(*x));
-        let mut points: Vec<Point3<f32>> = all.iter().copied().filter(is_near).collect();
+        let mut points: Vec<Point3<f32>> = all.iter().copied().filter(|p| bounds.hold(p)).collect();
         figures.noise = all.len() - points.len();
         let ground = Ground::of(&points, height).map(Arc::new);
-        let of_all = (0..).zip(all).filter(|(_, at)| is_near(at));
+        let of_all = (0..).zip(all).filter(|(_, at)| bounds.hold(at));
         let mut of_cloud: Vec<u32> = of_all.map(|(place, _)| place).collect();
         if let Some(ground) = &ground {
             let before = points.len();
@@ -431,6 +440,25 @@ impl Extent {
 
     fn holds(&self, x: f32) -> bool {
         (self.low - self.size..=self.low + 2.0 * self.size).contains(&x)
+    }
+}
+
+/// Where most points lie along each axis.
+#[derive(Clone, Copy, Debug)]
+struct Bounds([Extent; 3]);
+
+impl Bounds {
+    fn of(points: &[Point3<f32>]) -> Self {
+        Self([0, 1, 2].map(|axis| Extent::of(points, axis)))
+    }
+
+    fn sizes(&self) -> [f32; 3] {
+        self.0.map(|extent| extent.size)
+    }
+
+    fn hold(&self, point: &Point3<f32>) -> bool {
+        let mut along = self.0.iter().zip(point.iter());
+        along.all(|(extent, x)| extent.holds(*x))
     }
 }
 
