@@ -11,10 +11,11 @@ use super::image::{Decoded, Picture, decode, decode_depth};
 use super::records::{MessageHead, Record, Records, first_bytes, summary};
 use super::ros::{self, Kind, ROS_UNIT_M};
 use super::schema::{
-    CAPTURED_AT, CLOCK, DEPTH_CAMERA_PX, DEPTH_UNIT_M, FILE_CLOCK, FIRST_SEQUENCE, SHIFT_NS,
+    CAPTURED_AT, CLOCK, DEPTH_CAMERA_PX, DEPTH_DISTORTION, DEPTH_UNIT_M, FILE_CLOCK,
+    FIRST_SEQUENCE, SHIFT_NS,
 };
 use super::walk::Walk;
-use crate::model::{DepthImage, DepthRig, LocalTime, Origin, Pinhole, Size};
+use crate::model::{CameraModel, DepthImage, DepthRig, LocalTime, Origin, Pinhole, Size};
 use std::fs::File;
 use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
@@ -151,20 +152,28 @@ impl<R: Read + Seek> Reader<R> {
     }
 
     /// The colour camera for pictures of this size; `None` where the recording does not say.
-    pub fn depth_camera(&self, picture: Size) -> Option<Pinhole> {
+    pub fn depth_camera(&self, picture: Size) -> Option<CameraModel> {
         let mut own_px = [0.0; 4];
         for (px, key) in own_px.iter_mut().zip(DEPTH_CAMERA_PX) {
             *px = self.contents.number(key).unwrap_or(0.0);
         }
-        let own = Pinhole {
-            focal_px: [own_px[0], own_px[1]].into(),
-            middle_px: [own_px[2], own_px[3]].into(),
-        };
+        let mut own = CameraModel::new(
+            picture,
+            Pinhole {
+                focal_px: [own_px[0], own_px[1]].into(),
+                middle_px: [own_px[2], own_px[3]].into(),
+            },
+        );
+        let distortion = self.contents.about.get(DEPTH_DISTORTION);
+        let numbers = distortion.iter().flat_map(|text| text.split_whitespace());
+        for (own, number) in own.distortion.iter_mut().zip(numbers) {
+            *own = number.parse().unwrap_or(f64::NAN);
+        }
         if own.is_valid() {
             return Some(own);
         }
         let camera = self.foreign.camera()?;
-        Some(camera.for_size(picture).pinhole)
+        Some(camera.for_size(picture))
     }
 
     /// The cameras of depth and of pictures, where the depth is not registered with the pictures and
