@@ -266,7 +266,7 @@ fn tree_of(
     let by_levels = levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell);
     let raw = match options.method {
         CloudMethod::Paths => by_levels,
-        CloudMethod::Colonisation => colonise::colonise(&by_levels.contracted(points), base, cell),
+        CloudMethod::Colonisation => colonise::colonise(&by_levels, points, base, cell),
     };
     let mut paths = raw.paths();
     let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());
