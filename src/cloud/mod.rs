@@ -5,6 +5,7 @@
 //! lines by the shortest ways from there ([`levels`]) or by space colonisation ([`colonise`]);
 //! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]).
 
+mod base;
 mod circle;
 mod colonise;
 mod error;
@@ -285,7 +286,7 @@ fn tree_of(
     refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
     paths::prune(&mut paths, least);
     let noise = radius::noise(&paths);
-    stand_on(&mut paths, base);
+    base::stand(&mut paths, base, |at| standing.ground_at(at));
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
     radius::assign(&mut paths, figures.twig_radius_m);
@@ -392,6 +393,12 @@ impl Standing {
         above
     }
 
+    /// How high the ground is at a place, where any was scanned.
+    fn ground_at(&self, at: &Point3<f64>) -> Option<f64> {
+        let ground = self.ground.as_ref()?;
+        Some(ground.height_at(at.x as f32, at.y as f32).into())
+    }
+
     /// The foot below the lowest points of the trunk: in their middle, on the ground.
     fn foot_below(&self, points: &[Point3<f32>], lowest: &[u32]) -> Point3<f64> {
         let mut sum = Vector3::zeros();
@@ -403,11 +410,7 @@ impl Standing {
             .iter()
             .map(|p| f64::from(points[*p as usize].z))
             .fold(foot.z, f64::min);
-        if let Some(ground) = &self.ground {
-            foot.z = foot
-                .z
-                .min(f64::from(ground.height_at(foot.x as f32, foot.y as f32)));
-        }
+        foot.z = self.ground_at(&foot).map_or(foot.z, |z| foot.z.min(z));
         foot
     }
 }
@@ -551,13 +554,4 @@ fn reach_tips(paths: &mut [Path], points: &[Point3<f32>]) {
             .map(|p| (points[*p as usize].cast::<f64>() - tip.at).dot(&along));
         tip.at += along * ahead.fold(0.0, f64::max);
     }
-}
-
-/// Lets the trunk begin on the ground, below its first place.
-fn stand_on(paths: &mut [Path], base: Point3<f64>) {
-    let Some(trunk) = paths.first_mut() else {
-        return;
-    };
-    let first = &mut trunk.places[0];
-    first.at.z = first.at.z.min(base.z);
 }
