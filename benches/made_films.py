@@ -57,14 +57,21 @@ def main():
     parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
     parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
     parser.add_argument("--depth", action="store_true", help="a depth camera films it, in real metres")
+    parser.add_argument("--force", type=float, default=1.0, help="times as strong a pull")
+    parser.add_argument("--rope-at", type=int, metavar="BRANCH", help="the rope is on this branch (its id in truth.json): it and what "
+                        "carries it are bent, the others are only shaken by the release; without it all are bent")
     args = parser.parse_args()
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
-    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers, args.depth)
+    rope = tree.Rope(args.rope_at, args.force)
+    make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers,
+         args.depth, rope)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
+    if rope:
+        rope.bend(branches)
     theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
     theta_rad = bad.sways(theta_rad)
     pose = motion.Pose(branches, theta_rad)

@@ -16,6 +16,17 @@
                                                the first frame with the windows of its markers, a later one with where they
                                                are followed; below, of the first two markers, the way of the second one, the
                                                angle of its branch to that of the first, and its spectrum (needs numpy)
+    pictures.py angles OUT.png PANEL...        angles of marked branches to the next ones over time, or their spectra, two panels a row; a
+                                               PANEL is TITLE|time or spectrum|CURVE,CURVE..., a CURVE is FILM_DIR:CAPTURE:MARKER:LABEL,
+                                               a MARKER the number of its branch in the film's truth.json, or TRUNK (needs numpy)
+    pictures.py parameters FILM_DIR SMALL.json LARGE_DIR LARGE.json
+                                               prints frequency and damping of marked branches by two forces as a table, from what
+                                               `analyze --markers --json` says, beside Table 1 of Hu et al.
+    pictures.py swaying PLY QSM.csv HEIGHT OUT.png
+                                               the points of a scan beside its branches, these in the colour of the frequency that a film
+                                               gave them, from the front (needs numpy)
+    pictures.py fit PLY QSM.csv HEIGHT OUT.png
+                                               a scanned tree, and its points over it, from the front (needs numpy)
     pictures.py triangles EXAMPLE TREES OUT.png
                                                the forks of an example and of the trees grown of it in the triangles of their
                                                angles and lengths, with the fitted Dirichlet densities (needs numpy, scipy)
@@ -316,6 +327,92 @@ def cloud(ply, document, side, out):
     Image.fromarray(grey.astype(np.uint8)).convert("RGB").save(out)
 
 
+NO_GROUND_M = 0.35  # above the foot, on a slope
+WOOD, POINT, UNKNOWN = (150, 118, 90), (30, 80, 210), (190, 190, 190)
+
+
+class Scanned:
+    """A scan and the cylinders of its tree (`export --format qsm`), as both are seen from the front: x to the right, z up, m."""
+
+    def __init__(self, ply, qsm, height):
+        import numpy as np
+
+        raw, self.height = Path(ply).read_bytes(), int(height)
+        points = np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], "<f8").reshape(-1, 3)
+        self.cylinders = rows(qsm)
+        foot = min(float(c["startZ"]) for c in self.cylinders)
+        self.points = points[points[:, 2] > foot + NO_GROUND_M]
+        self.low, self.top = self.points[:, 0].min() - 0.2, self.points[:, 2].max() + 0.2
+        self.px_per_m = (self.height - 1) / (self.top - foot + 0.1)
+        self.width = int((self.points[:, 0].max() + 0.2 - self.low) * self.px_per_m)
+
+    def panel(self):
+        """An empty one, drawn larger, and a pen on it."""
+        panel = Image.new("RGB", (FINE * self.width, FINE * self.height), "white")
+        return panel, ImageDraw.Draw(panel)
+
+    def at(self, x, z):
+        return FINE * (x - self.low) * self.px_per_m, FINE * (self.top - z) * self.px_per_m
+
+    def wood(self, pen, colour_of):
+        for c in self.cylinders:
+            ends = [self.at(float(c[f"{end}X"]), float(c[f"{end}Z"])) for end in ("start", "end")]
+            width = max(round(2 * FINE * float(c["radius"]) * self.px_per_m), 2)
+            pen.line(ends, fill=colour_of(c), width=width)
+            for (u, v), r in zip(ends, (width / 2 - 1,) * 2):
+                pen.ellipse([u - r, v - r, u + r, v + r], fill=colour_of(c))
+
+    def dots(self, pen, colour, share):
+        for x, _, z in self.points[::share]:
+            pen.point(self.at(x, z), fill=colour)
+
+
+def beside(panels, size, out):
+    """Panels of one size in a row, scaled down."""
+    row = Image.new("RGB", (len(panels) * size[0], size[1]), "white")
+    for k, panel in enumerate(panels):
+        row.paste(panel.resize(size, Image.LANCZOS), (k * size[0], 0))
+    save(row, out)
+
+
+def fit(ply, qsm, height, out):
+    """Hu et al. fig. 14: the tree, and how its points lie on it."""
+    scan = Scanned(ply, qsm, height)
+    panels = []
+    for with_points in (False, True):
+        panel, pen = scan.panel()
+        scan.wood(pen, lambda cylinder: WOOD)
+        if with_points:
+            scan.dots(pen, POINT, 4)
+        panels.append(panel)
+    beside(panels, (scan.width, scan.height), out)
+
+
+def swaying(ply, qsm, height, out):
+    """What a film said of the branches of a scan."""
+    scan = Scanned(ply, qsm, height)
+    dots, pen = scan.panel()
+    scan.dots(pen, (60, 60, 60), 2)
+    hz_of = lambda cylinder: round(float(cylinder["frequency_hz"]), 2) if cylinder["frequency_hz"] else None
+    known = sorted({hz_of(c) for c in scan.cylinders} - {None})
+    colours = {hz: spectral(k / max(len(known) - 1, 1)) for k, hz in enumerate(known)} | {None: UNKNOWN}
+    branches, pen = scan.panel()
+    scan.wood(pen, lambda cylinder: colours[hz_of(cylinder)])
+    font = ImageFont.truetype(str(FONTS / "DejaVuSans.ttf"), 12 * FINE)
+    for k, hz in enumerate(known):
+        # Where the tree is not: beside the trunk.
+        at = FINE * scan.width - 12, FINE * (scan.height - 17 * (len(known) - k) - 6)
+        pen.text(at, f"{hz:.2f} Hz", fill=colours[hz], font=font, anchor="ra")
+    beside([dots, branches], (scan.width, scan.height), out)
+
+
+def spectral(share):
+    """From blue, the slowest, to red."""
+    import colorsys
+
+    return tuple(round(200 * c) for c in colorsys.hsv_to_rgb(0.66 * (1 - share), 1, 1))
+
+
 MARKER_BLUE, MARKER_YELLOW, AXES = (40, 90, 230), (255, 220, 0), (120, 120, 120)
 FIRST_MARKER = 1_000_000_000
 
@@ -324,12 +421,7 @@ def markers(film, capture, first, later, later_frame, out):
     """Hu et al. figs 2, 3, 6 and 7 for a made film."""
     import numpy as np
 
-    windows = json.loads((Path(capture) / "capture.json").read_text())["config"]["markers"]["windows"]
-    seen = {}
-    for row in rows(Path(capture) / "tracks.csv"):
-        if int(row["track_id"]) >= FIRST_MARKER:
-            place = float(row["u_px"]), float(row["v_px"]), float(row["time_s"])
-            seen.setdefault(int(row["track_id"]) - FIRST_MARKER, {})[int(row["frame"])] = place
+    windows, seen = seen_markers(capture)
     pictures = [Image.open(path).convert("RGB") for path in (first, later)]
     font = ImageFont.truetype(str(FONTS / "DejaVuSans.ttf"), 11)
     draw = ImageDraw.Draw(pictures[0])
@@ -346,14 +438,8 @@ def markers(film, capture, first, later, later_frame, out):
     frames = sorted(set(seen[0]) & set(seen[1]))
     lower, upper = (np.array([seen[k][f][:2] for f in frames]) for k in (0, 1))
     time_s = np.array([seen[0][f][2] for f in frames])
-    outline = json.loads((Path(film) / "outline.json").read_text())["polygon_px"]
-    foot = np.array(max(outline, key=lambda p: p[1]), float)
-    turn = lambda a: np.unwrap(np.arctan2(a[:, 0], -a[:, 1]))
-    angle_deg = np.degrees(turn(upper - lower) - turn(lower - foot))
-    angle_deg -= angle_deg.mean()
-    even_s = np.linspace(time_s[0], time_s[-1], len(time_s))
-    power = np.abs(np.fft.rfft(np.interp(even_s, time_s, angle_deg), 8 * len(time_s))) * 2 / len(time_s)
-    hz = np.fft.rfftfreq(8 * len(time_s), even_s[1] - even_s[0])
+    angle_deg = angle_to(upper, lower, foot_of(film))
+    hz, power = spectrum(time_s, angle_deg)
     width, height = pictures[0].size
     picture = Image.new("RGB", (2 * width, height + 230), "white")
     for k, part in enumerate(pictures):
@@ -367,14 +453,142 @@ def markers(film, capture, first, later, later_frame, out):
     save(picture, out)
 
 
-def curve(draw, box, x, y, title, font):
-    """One line in a box (left, top, width, height) with its extremes."""
+def seen_markers(capture):
+    """The windows of a capture's markers, and where and when each was seen in which frame: {number: {frame: (u, v, s)}}."""
+    windows = json.loads((Path(capture) / "capture.json").read_text())["config"]["markers"]["windows"]
+    seen = {}
+    for row in rows(Path(capture) / "tracks.csv"):
+        if int(row["track_id"]) >= FIRST_MARKER:
+            place = float(row["u_px"]), float(row["v_px"]), float(row["time_s"])
+            seen.setdefault(int(row["track_id"]) - FIRST_MARKER, {})[int(row["frame"])] = place
+    return windows, seen
+
+
+def foot_of(film):
+    import numpy as np
+
+    outline = json.loads((Path(film) / "outline.json").read_text())["polygon_px"]
+    return np.array(max(outline, key=lambda p: p[1]), float)
+
+
+def angle_to(upper, lower, below):
+    """Signed angle of upper - lower to lower - below, degrees off its mean (Hu et al. eq. 1, which has no sign)."""
+    import numpy as np
+
+    turn = lambda a: np.unwrap(np.arctan2(a[:, 0], -a[:, 1]))
+    angle_deg = np.degrees(turn(upper - lower) - turn(lower - below))
+    return angle_deg - angle_deg.mean()
+
+
+def spectrum(time_s, angle_deg):
+    import numpy as np
+
+    even_s = np.linspace(time_s[0], time_s[-1], len(time_s))
+    power = np.abs(np.fft.rfft(np.interp(even_s, time_s, angle_deg), 8 * len(time_s))) * 2 / len(time_s)
+    return np.fft.rfftfreq(8 * len(time_s), even_s[1] - even_s[0]), power
+
+
+def marker_on(film, branch):
+    """The name of the marker on a branch of a made film; on the trunk the lowest."""
+    on = [m for m in json.loads((Path(film) / "truth_markers.json").read_text())["markers"] if m["branch"] == int(branch)]
+    return min(on, key=lambda m: m["frac"])["name"] if on else None
+
+
+def marker_angle(film, capture, branch):
+    """When a marked branch had which angle to the one that carries it, by markers: s, degrees."""
+    import numpy as np
+
+    windows, seen = seen_markers(capture)
+    number = {window["name"]: k for k, window in enumerate(windows)}
+    parent = {window["name"]: window.get("parent") for window in windows}
+    chain = [marker_on(film, branch)]
+    if chain[0] is None:
+        sys.exit(f"pictures: no marker of {film} is on branch {branch}")
+    while len(chain) < 3 and chain[-1] and parent[chain[-1]]:
+        chain.append(parent[chain[-1]])
+    seen = [seen[number[name]] for name in chain]
+    frames = sorted(set.intersection(*map(set, seen)))
+    foot, places = foot_of(film), [np.array([one[f][:2] for f in frames]) for one in seen]
+    # Below the last marker is the foot, and below that the ground.
+    places += [np.tile(foot, (len(frames), 1)), np.tile(foot + [0.0, 100.0], (len(frames), 1))]
+    return np.array([seen[0][f][2] for f in frames]), angle_to(*places[:3])
+
+
+COLOURS = [(40, 90, 230), (210, 60, 40), (30, 150, 70), (150, 80, 190)]
+PANEL = 470, 190  # px
+HIGHEST_HZ = 4.0
+
+
+def angles(out, *panels):
+    """Hu et al. figs 6, 7 and 9 to 12 for made films: panels of curves."""
+    import numpy as np
+
+    font = ImageFont.truetype(str(FONTS / "DejaVuSans.ttf"), 11)
+    width, height = PANEL
+    picture = Image.new("RGB", (2 * width, height * ((len(panels) + 1) // 2)), "white")
+    draw = ImageDraw.Draw(picture)
+    for k, panel in enumerate(panels):
+        title, kind, curves = panel.split("|")
+        lines = []
+        for one in curves.split(","):
+            film, capture, branch, label = one.split(":")
+            time_s, angle_deg = marker_angle(film, capture, branch)
+            if kind == "spectrum":
+                released_s = json.loads((Path(film) / "truth.json").read_text())["motion"]["release_time_s"]
+                free = time_s > released_s
+                hz, power = spectrum(time_s[free], angle_deg[free] - angle_deg[free].mean())
+                time_s, angle_deg = hz[hz <= HIGHEST_HZ], power[hz <= HIGHEST_HZ]
+            lines.append((label, time_s, angle_deg))
+        low = 0.0 if kind == "spectrum" else min(y.min() for _, _, y in lines)
+        high = max(y.max() for _, _, y in lines)
+        units = "degrees, by Hz" if kind == "spectrum" else "degrees, by s"
+        box = (width * (k % 2), height * (k // 2), width, height)
+        for line, (label, x, y) in enumerate(lines):
+            # The first draws the frame; all have its axes.
+            curve(draw, box, x, y, f"{title}, {units}" if line == 0 else None, font, (low, high), COLOURS[line % len(COLOURS)])
+            if len(lines) > 1:
+                at = box[0] + width - 20, box[1] + 30 + 14 * line
+                draw.text(at, label, fill=COLOURS[line % len(COLOURS)], font=font, anchor="ra")
+    save(picture, out)
+
+
+HU_TABLE_1 = {  # branch: small force Hz, damping; large force Hz, damping
+    "A": (1.46, 0.104, 1.46, 0.120), "C": (1.46, 0.086, 1.46, 0.081), "D": (1.46, 0.072, 1.46, 0.075), "E": (1.46, 0.072, 1.46, 0.074),
+    "B": (1.46, 0.084, 1.39, 0.077), "I": (1.46, 0.133, 1.46, 0.096), "H": (1.46, 0.069, 1.46, 0.191), "F": (1.39, 0.077, 1.46, 0.094),
+    "G": (1.39, 0.089, 1.46, 0.141), "J": (1.46, 0.241, 1.46, 0.093),
+}
+
+
+def parameters(small_film, small, large_film, large):
+    found = [by_branch(film, answers) for film, answers in ((small_film, small), (large_film, large))]
+    common = [b for b in found[0] if b in found[1]]
+    print("| Hu et al.: branch | small force f, Hz | ξ | large force f, Hz | ξ | ours: branch | small force f, Hz | ξ | large force f, Hz | ξ |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for name, branch in zip(HU_TABLE_1, common):
+        ours = [f"{x:.2f}" if k % 2 == 0 else f"{x:.3f}" for one in found for k, x in enumerate(one[branch])]
+        theirs = HU_TABLE_1[name]
+        print(f"| {name} | {theirs[0]:.2f} | {theirs[1]:.3f} | {theirs[2]:.2f} | {theirs[3]:.3f} | {branch} | {' | '.join(ours)} |")
+
+
+def by_branch(film, answers):
+    """Largest peak and half-power damping of each marked branch, by its number in the film's truth."""
+    marked = {m["name"]: m for m in json.loads((Path(film) / "truth_markers.json").read_text())["markers"]}
+    branches = json.loads(Path(answers).read_text())["captures"][0]["branches"]
+    lowest = {b["branch"]: marked[b["branch"]] for b in branches if b["branch"] == marker_on(film, marked[b["branch"]]["branch"])}
+    told = {b["branch"]: (b["spectrum_peak_hz"], b["half_power_damping"]) for b in branches}
+    return {m["branch"]: told[name] for name, m in lowest.items() if None not in told[name]}
+
+
+def curve(draw, box, x, y, title, font, bounds=None, colour=MARKER_BLUE):
+    """One line in a box (left, top, width, height) with its extremes, or within bounds; without a title only the line."""
     left, top, width, height = box
     inner = left + 46, top + 24, left + width - 14, top + height - 26
-    (x0, x1), (y0, y1) = (x.min(), x.max()), (y.min(), y.max())
+    (x0, x1), (y0, y1) = (x.min(), x.max()), bounds or (y.min(), y.max())
     to = lambda a, b: (inner[0] + (a - x0) / (x1 - x0) * (inner[2] - inner[0]), inner[3] - (b - y0) / (y1 - y0) * (inner[3] - inner[1]))
+    draw.line([to(a, b) for a, b in zip(x, y)], fill=colour, width=1)
+    if title is None:
+        return
     draw.rectangle(inner, outline=AXES)
-    draw.line([to(a, b) for a, b in zip(x, y)], fill=MARKER_BLUE, width=1)
     draw.text((inner[0], top + 6), title, fill=(0, 0, 0), font=font)
     for value, at, anchor in ((y0, (inner[0] - 4, inner[3]), "rs"), (y1, (inner[0] - 4, inner[1]), "rt"),
                               (x0, (inner[0], inner[3] + 4), "lt"), (x1, (inner[2], inner[3] + 4), "rt")):
@@ -485,9 +699,10 @@ def dirichlet(shares):
 if __name__ == "__main__":
     commands = {
         "terminal": (terminal, 2), "points": (points, 2), "sheet": (sheet, 5), "drawing": (drawing, 3),
-        "photo": (photo, 5), "cloud": (cloud, 4), "markers": (markers, 6), "triangles": (triangles, 3),
+        "photo": (photo, 5), "cloud": (cloud, 4), "markers": (markers, 6), "triangles": (triangles, 3), "angles": (angles, None),
+        "parameters": (parameters, 4), "swaying": (swaying, 4), "fit": (fit, 4),
     }
     command, count = commands.get(sys.argv[1] if len(sys.argv) > 1 else "", (None, 0))
-    if command is None or len(sys.argv) != 2 + count:
+    if command is None or len(sys.argv) != 2 + (len(sys.argv) - 2 if count is None else count):
         sys.exit(__doc__)
     command(*sys.argv[2:])

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # Makes the pictures of README and docs anew: of the shipped clip, and of the oak too if CLIPS names a folder that
 # holds oak_release/video.mkv and outline.json (by default $ARBORCAM_CLIPS). ONLY=name makes one group: views, film, shapes,
-# wind, grown, sketch, photo, cloud, markers, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
+# wind, grown, sketch, photo, cloud, markers, hu, forest, points, terminal, page, sheets. The sheets (film, wood, traced branches, skeleton and model of each
 # clip) go to out/;
-# without CLIPS the second is of a film made anew, for which, and for `grown`, `photo` and `markers`, PYTHON (python3) needs numpy, scipy and opencv.
+# without CLIPS the second is of a film made anew, for which, and for `grown`, `photo`, `markers` and `hu`, PYTHON (python3) needs numpy, scipy and opencv.
 # WOOD names a built bench `wood`. Needs what scripts/apt-packages-test.txt lists, and `make build` first.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -306,6 +306,77 @@ markers() {
     told "$to/markers.png"
 }
 
+# Figures 6, 7, 9 to 12 and 14 of Hu et al., and their Table 1, of made films and scans: a tree with ten markers that is pulled with a
+# rope on its whole crown, on one branch with two forces, and on another one; a second tree; a scan of the first with what a film of
+# it told, and scans of both with the trees that space colonisation grows.
+hu() {
+    local seed=53101 other=53102 name
+    pulled all $seed
+    pulled at-1 $seed --rope-at 1
+    pulled at-1-half $seed --rope-at 1 --force 0.5
+    pulled at-3 $seed --rope-at 3
+    pulled other $other
+    "$python" scripts/pictures.py angles "$to/hu-angles.png" \
+        "branch 3|time|$(swing at-1 3)" "its spectrum|spectrum|$(swing at-1 3)" "branch 18, on branch 3|time|$(swing at-1 18)" \
+        "its spectrum|spectrum|$(swing at-1 18)" "branch 1|time|$(swing at-1 1)" "its spectrum|spectrum|$(swing at-1 1)" \
+        "branch 7, on branch 1|time|$(swing at-1 7)" "its spectrum|spectrum|$(swing at-1 7)"
+    told "$to/hu-angles.png"
+    "$python" scripts/pictures.py angles "$to/hu-spectra.png" \
+        "branch 3, rope at three places|spectrum|$(swing at-1 3 "on branch 1"),$(swing at-3 3 "on branch 3"),$(swing all 3 "on the crown")" \
+        "branch 1, rope at three places|spectrum|$(swing at-1 1 "on branch 1"),$(swing at-3 1 "on branch 3"),$(swing all 1 "on the crown")" \
+        "one tree|spectrum|$(swing all 1 1),$(swing all 3 3),$(swing all 5 5),$(swing all 18 18)" \
+        "another tree|spectrum|$(swing other 3 3),$(swing other 5 5),$(swing other 10 10),$(swing other 8 8)" \
+        "trunk, two forces|spectrum|$(swing at-1 0 full),$(swing at-1-half 0 half)" \
+        "branch 3, two forces|spectrum|$(swing at-1 3 full),$(swing at-1-half 3 half)" \
+        "branch 18 of the third level|spectrum|$(swing at-1 18 "on branch 1"),$(swing at-3 18 "on branch 3"),$(swing all 18 "on the crown")"
+    told "$to/hu-spectra.png"
+    for name in at-1-half at-1; do
+        "$arborcam" analyze "$work/pulled-$name-tree" --markers --json >"$work/pulled-$name.json" 2>"$work/pulled.log" ||
+            fail "analyze of $name failed: $(tail -n 1 "$work/pulled.log")"
+    done
+    "$python" scripts/pictures.py parameters "$work"/pulled-at-1-half{,.json} "$work"/pulled-at-1{,.json}
+    scanned_beside $seed $other
+}
+
+# pulled NAME SEED OPTIONS...: a made film of ten markers on a tree that is pulled and let go, and its capture.
+pulled() {
+    local name=$1 seed=$2 film=$work/pulled-$1
+    shift 2
+    "$python" benches/made_films.py "$work" "pulled-$name" "$seed" bare held --markers 10 --seconds 13.634 "$@" ||
+        fail "no film with markers could be made; see the head of benches/made_films.py for what PYTHON needs"
+    "$arborcam" replay "$film/video.mkv" --outline "$film/outline.json" --markers "$film/markers.json" --fast --headless \
+        --out "$film-tree" 2>"$film.log" || fail "the replay of $name failed: $(tail -n 1 "$film.log")"
+}
+
+# swing NAME BRANCH [LABEL]: a curve for `pictures.py angles`.
+swing() { printf '%s:%s:%s:%s' "$work/pulled-$1" "$work/pulled-$1-tree" "$2" "${3:-}"; }
+
+# scanned_beside SEED OTHER: the first scan with the frequencies of a film, and both with their trees by space colonisation.
+scanned_beside() {
+    local seed film=$work/released
+    "$python" benches/made_films.py "$work" released "$1" bare release || fail "no film could be made"
+    "$arborcam" replay "$film/video.mkv" --outline "$film/outline.json" --fast --headless --out "$film-tree" 2>"$film.log" ||
+        fail "the replay failed: $(tail -n 1 "$film.log")"
+    for seed in "$@"; do
+        "$python" benches/made_clouds.py "$work" "scan-$seed" "$seed" || fail "no cloud could be made; see the head of benches/made_clouds.py"
+        cylinders "$seed" grown --method colonisation
+        "$python" scripts/pictures.py fit "$work/scan-$seed/cloud.ply" "$work/scan-$seed-grown.csv" 330 "$work/fit-$seed.png"
+    done
+    row "$to/cloud-fit.png" "$work"/fit-{$1,$2}.png
+    cylinders "$1" swaying --film "$film-tree"
+    "$python" scripts/pictures.py swaying "$work/scan-$1/cloud.ply" "$work/scan-$1-swaying.csv" 360 "$to/cloud-film.png"
+    told "$to/cloud-film.png"
+}
+
+# cylinders SEED NAME OPTIONS...: the table of cylinders of a scan's tree.
+cylinders() {
+    local scan=$work/scan-$1 name=$2
+    shift 2
+    "$arborcam" cloud "$scan/cloud.ply" --out "$scan-$name" "$@" 2>"$work/cloud.log" &&
+        "$arborcam" export "$scan-$name" --format qsm --out "$scan-$name.csv" 2>"$work/cloud.log" ||
+        fail "cloud failed: $(tail -n 1 "$work/cloud.log")"
+}
+
 # Forty trees of eight on a hill.
 forest() {
     local tree=winter
@@ -430,6 +501,7 @@ wanted sketch && sketch
 wanted photo && photo
 wanted cloud && cloud
 wanted markers && markers
+wanted hu && hu
 wanted forest && forest
 wanted points && points
 wanted terminal && terminal

@@ -13,7 +13,7 @@ mod reload;
 mod setting;
 mod settings;
 
-pub use depth_camera::DepthCamera;
+pub use depth_camera::{DepthCamera, check_distortion};
 pub use load::{ConfigError, STROKE_POINTS, check_strokes};
 pub use markers::{MAX_MARKERS, MarkerCorrection, MarkerWindow};
 pub use reference::{default_file, help, tables};

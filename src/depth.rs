@@ -34,6 +34,15 @@ pub fn pinhole(settings: &config::Depth) -> Option<Pinhole> {
     pinhole.is_valid().then_some(pinhole)
 }
 
+/// The same with its distortion, for pictures of the size `picture`.
+pub fn colour_camera(settings: &config::Depth, picture: Size) -> Option<CameraModel> {
+    Some(CameraModel {
+        size: picture,
+        pinhole: pinhole(settings)?,
+        distortion: CameraModel::coefficients(&settings.distortion),
+    })
+}
+
 /// The depth camera of the settings beside the colour camera; `None` where they have none.
 pub fn rig(settings: &config::Depth, colour: CameraModel) -> Option<DepthRig> {
     let own = settings.own_camera.first()?;
@@ -41,10 +50,11 @@ pub fn rig(settings: &config::Depth, colour: CameraModel) -> Option<DepthRig> {
         focal_px: Vector2::new(own.fx_px, own.fy_px),
         middle_px: Point2::new(own.cx_px, own.cy_px),
     };
-    let mut depth = CameraModel::new(Size::new(own.width, own.height), pinhole);
-    for (to, from) in depth.distortion.iter_mut().zip(&own.distortion) {
-        *to = *from;
-    }
+    let depth = CameraModel {
+        size: Size::new(own.width, own.height),
+        pinhole,
+        distortion: CameraModel::coefficients(&own.distortion),
+    };
     let turn = Rotation3::from_matrix(&Matrix3::from_row_slice(&own.rotation));
     let colour_from_depth = Isometry3::from_parts(
         Translation3::from(own.translation_m),
@@ -62,6 +72,7 @@ pub fn format(settings: &config::Depth) -> Option<DepthFormat> {
     let pinhole = pinhole(settings).filter(|_| settings.read && settings.unit_m > 0.0)?;
     Some(DepthFormat {
         pinhole,
+        distortion: CameraModel::coefficients(&settings.distortion),
         unit_m: settings.unit_m,
     })
 }
@@ -77,8 +88,15 @@ pub fn settings_of_run(settings: &config::Depth, format: Option<&DepthFormat>) -
         fy_px: focal_px.y,
         cx_px: middle_px.x,
         cy_px: middle_px.y,
+        distortion: format.map_or(Vec::new(), |format| without_zeros(&format.distortion)),
         ..settings.clone()
     }
+}
+
+/// Coefficients without those at the end that are 0.
+fn without_zeros(distortion: &[f64; 8]) -> Vec<f64> {
+    let last = distortion.iter().rposition(|k| *k != 0.0);
+    distortion[..last.map_or(0, |last| last + 1)].to_vec()
 }
 
 /// Reads depths of points.

@@ -4,7 +4,8 @@
 mod chance;
 
 use arborcam::import::read_lens_profile;
-use arborcam::model::{Distortion, Lens, Size};
+use arborcam::model::{Distortion, Lens, PixelFormat, RawFrame, Size, seconds};
+use arborcam::recording::{Head, Limits, Series};
 use chance::Chance;
 use image::GrayImage;
 use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
@@ -183,4 +184,43 @@ fn views_that_say_too_little_get_one_line() {
     }
     let output = arborcam(&dir.path().join("absent"), &dir.path().join("absent.json"));
     assert_eq!(output.status.code(), Some(3));
+}
+
+/// A lens is for pictures of one size.
+#[test]
+fn pictures_of_several_sizes_are_refused() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let sizes = [SIZE, SIZE, Size::new(320, 240)];
+    let [folder, film, out] = ["pictures", "film.mcap", "lens.json"].map(|n| dir.path().join(n));
+    fs::create_dir(&folder).expect("folder");
+    let mut series = Series::create(&film, Head::default(), Limits::default(), || 0).expect("film");
+    for (k, size) in (0..).zip(sizes) {
+        let picture = GrayImage::new(size.width, size.height);
+        picture
+            .save(folder.join(format!("{k}.png")))
+            .expect("picture");
+        let frame = RawFrame {
+            sequence: Some(k),
+            sensor_time_s: seconds(k as i64 * 1_000_000_000),
+            size,
+            format: PixelFormat::Grey,
+            bytes: picture.into_raw(),
+            depth: None,
+        };
+        series.frame(&frame, k).expect("frame");
+    }
+    series.close().expect("closed");
+    for input in [&folder, &film] {
+        let output = arborcam(input, &out);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        let names = [
+            "320x240",
+            "640x480",
+            "one size",
+            &input.display().to_string(),
+        ];
+        assert!(names.iter().all(|n| said.contains(n)), "{said}");
+        assert!(said.lines().count() == 1 && !out.exists(), "{said}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Films of an Azure Kinect, made with ffmpeg: both tracks, the calibration, and what is wrong with some.
 
 use arborcam::config::Config;
-use arborcam::model::{RawFrame, Size};
+use arborcam::model::{CameraModel, RawFrame, Size};
 use arborcam::source::{self, SourceInfo};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -28,7 +28,7 @@ const CALIBRATION: &str = r#"{"CalibrationInformation": {"Cameras": [
      "Purpose": "CALIBRATION_CameraPurposeDepth", "SensorWidth": 1024, "SensorHeight": 1024,
      "Rt": {"Rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "Translation": [0, 0, 0]}},
     {"Intrinsics": {"ModelParameterCount": 14, "ModelType": "CALIBRATION_LensDistortionModelBrownConrady",
-        "ModelParameters": [0.5, 0.5, 0.8, 1.0666666667, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]},
+        "ModelParameters": [0.5, 0.5, 0.8, 1.0666666667, 0.01, 0, 0, 0, 0, 0, 0, 0, 0, 0]},
      "Purpose": "CALIBRATION_CameraPurposePhotoVideo", "SensorWidth": 4096, "SensorHeight": 3072,
      "Rt": {"Rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1], "Translation": [0, 0, 0]}}]}}"#;
 
@@ -129,6 +129,7 @@ fn both_tracks_are_read_and_the_depth_is_put_into_the_colours() {
     assert_eq!(format.unit_m, 0.001);
     assert!((format.pinhole.focal_px.x - 256.0).abs() < 1e-6);
     assert!((format.pinhole.focal_px.y - 256.0).abs() < 1e-6);
+    assert_eq!(format.distortion, CameraModel::coefficients(&[0.01]));
     // ffmpeg leaves out the last depth image when it writes such a film.
     let with_depth = usize::from(FRAMES) - 1;
     for (k, frame) in film.frames.iter().enumerate().take(with_depth) {

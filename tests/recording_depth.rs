@@ -62,6 +62,7 @@ fn our_own_depth_comes_back_to_the_byte() {
             focal_px: Vector2::new(612.345_678_901_2, 611.1),
             middle_px: Point2::new(7.25, 3.5),
         },
+        distortion: [0.5, -2.6, 0.001, -0.0003, 1.5, 0.38, -2.4, 1.45],
         unit_m: 0.000_25,
     };
     let head = Head {

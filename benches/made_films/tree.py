@@ -151,6 +151,23 @@ def turning_axes(along):
     return e1, np.cross(along, e1)
 
 
+class Rope:
+    """Where the tree is pulled, and how strongly: Hu et al. (sect. 5.4) pull one branch, and compare places and forces."""
+
+    SHAKEN = 0.5  # of the usual pull: what the release shakes of a branch that does not carry the rope
+
+    def __init__(self, branch=None, force=1.0):
+        self.branch, self.force = branch, force
+
+    def bend(self, branches):
+        carries, at = set(), self.branch
+        while at is not None and at >= 0:
+            carries.add(at)
+            at = branches[at].parent
+        for b in branches:
+            b.pull_rad = self.force * (1.0 if not carries or b.id in carries else self.SHAKEN) * b.pull_rad
+
+
 def pull(rng, branch, pull_direction):
     """The angles of the pulled branch: about the axis of the pull's torque, a little off, for no two are loaded alike."""
     torque = np.cross(branch.at(0.0)[1], pull_direction)

@@ -8,8 +8,8 @@ use crate::config::Config;
 use crate::export::lens_profile::lens_profile;
 use crate::files::{OutputFile, refuse_taken};
 use crate::model::{Luma, Size};
-use crate::source::{self, Decoder, Source};
-use anyhow::Context;
+use crate::source::{self, DecodeError, Decoder, Source};
+use anyhow::{Context, anyhow};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -97,9 +97,17 @@ fn see(source: &mut dyn Source, board: Board) -> Result<Seen, CommandError> {
             continue;
         }
         next_s = raw.sensor_time_s + 1.0 / LOOKS_PER_S;
-        // A damaged picture of a film is one of many.
-        if decoder.luma(&raw, &mut luma).is_err() {
-            continue;
+        match decoder.luma(&raw, &mut luma) {
+            Ok(()) => {}
+            // A lens is for one size.
+            Err(e @ DecodeError::SizeChanged { .. }) => {
+                return Err(CommandError::NoInput(anyhow!(
+                    "{}: {e}; give pictures of one size",
+                    source.describe().name
+                )));
+            }
+            // A damaged picture of a film is one of many.
+            Err(_) => continue,
         }
         seen.pictures += 1;
         seen.size = luma.size;

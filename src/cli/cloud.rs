@@ -9,8 +9,7 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
 use crate::cloud::{
-    CloudError, CloudMethod, CloudOptions, CloudTree, CloudTrees, PlacePair, Registration,
-    trees_of_cloud,
+    CloudMethod, CloudOptions, CloudTree, CloudTrees, Registration, trees_of_cloud,
 };
 use crate::config::Config;
 use crate::document::Document;
@@ -134,8 +133,6 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let config = scan_defaults().layered(args.config.as_deref(), |config| {
         config.wood.seed = args.seed;
     })?;
-    let of_file =
-        |e: anyhow::Error| CommandError::Failed(e.context(args.file.display().to_string()));
     let CloudRead {
         cloud,
         units_in_file,
@@ -146,7 +143,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
         in_leaf: args.in_leaf,
     };
-    let found = trees_of_cloud(&cloud, options).map_err(|e| of_file(e.into()))?;
+    let found = trees_of_cloud(&cloud, options).map_err(|e| args.failed(e))?;
     let given = args.unit.map(|unit| Units::all(unit.metres()));
     let scan = Scan {
         name: args
@@ -170,8 +167,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         unused::note("--points", "one tree is written");
     }
     let tree = args.chosen(found, number)?;
-    let tree = tree.map_err(|e| of_file(e.into()))?;
-    let drawn = scan.drawn(&tree).map_err(of_file)?;
+    let drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
     if stop.while_writing().load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
@@ -243,12 +239,16 @@ impl Scan {
 }
 
 impl CloudArgs {
+    /// What failed with this file.
+    fn failed(&self, e: impl Into<anyhow::Error>) -> CommandError {
+        CommandError::Failed(e.into().context(self.file.display().to_string()))
+    }
+
     /// The tree with this number, and a word on the others.
-    fn chosen(
-        &self,
-        mut found: CloudTrees,
-        number: u64,
-    ) -> Result<Result<CloudTree, CloudError>, CommandError> {
+    ///
+    /// # Errors
+    /// There are not so many, or it could not be made.
+    fn chosen(&self, mut found: CloudTrees, number: u64) -> Result<CloudTree, CommandError> {
         let count = found.trees.len();
         if number > count as u64 {
             let trees = if count == 1 {
@@ -264,7 +264,8 @@ impl CloudArgs {
         if count > 1 {
             eprint_line(&format!("arborcam: note: this is tree {number} of {count}"));
         }
-        Ok(found.trees.swap_remove(number as usize - 1))
+        let tree = found.trees.swap_remove(number as usize - 1);
+        tree.map_err(|e| self.failed(e))
     }
 
     /// A film is of one tree.
@@ -297,14 +298,12 @@ impl CloudArgs {
             .first()
             .map_or(Vector3::zeros(), |n| n.position.coords)
             + scan.cloud.origin;
-        let pairs = self.pairs.as_ref().map(|pairs| {
-            let against_foot = |p: &PlacePair| PlacePair {
-                scan: scan.metres(&p.scan) - foot,
-                ..*p
-            };
-            pairs.0.iter().map(against_foot).collect::<Vec<_>>()
-        });
-        let registration = register_film(tree, &film, pairs.as_deref()).filter(Registration::holds);
+        let mut pairs = self.pairs.clone();
+        for pair in pairs.iter_mut().flat_map(|pairs| &mut pairs.0) {
+            pair.scan = scan.metres(&pair.scan) - foot;
+        }
+        let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
+        let registration = register_film(tree, &film, pairs).filter(Registration::holds);
         let registration = registration.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
@@ -355,10 +354,9 @@ fn print_units(units: Option<Units>) {
 
 fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
     let figures = tree.figures;
-    let share = |points: usize| 100.0 * points as f64 / figures.points.max(1) as f64;
     let leaves = match figures.leaves {
         0 => String::new(),
-        leaves => format!(", {:.0} % leaves", share(leaves)),
+        leaves => format!(", {:.0} % leaves", figures.percent(leaves)),
     };
     eprint_line(&format!(
         "{}: a tree of {branches} branches, {:.2} m high; of {} points {:.0} % are ground{leaves} \
@@ -366,7 +364,7 @@ fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
         out.display(),
         figures.height_m,
         figures.points,
-        share(figures.ground),
-        share(figures.noise),
+        figures.percent(figures.ground),
+        figures.percent(figures.noise),
     ));
 }

@@ -3,7 +3,8 @@
 use super::command_error::CommandError;
 use super::common::parse_within;
 use crate::config;
-use crate::model::Size;
+use crate::import::read_lens_profile;
+use crate::model::{Distortion, Pinhole, Size};
 use crate::source::CameraFile;
 use anyhow::anyhow;
 use clap::Args;
@@ -21,7 +22,8 @@ pub struct DepthArgs {
     #[arg(long, value_name = "METRES", value_parser = unit)]
     depth_unit: Option<f64>,
     /// The colour camera of a film with depth, where the film does not say it: a JSON file with fx, fy,
-    /// cx and cy (px), or with an intrinsic_matrix as Open3D writes it. See docs/depth.md.
+    /// cx and cy (px), or with an intrinsic_matrix as Open3D writes it, or a profile by `calibrate`. See
+    /// docs/depth.md.
     #[arg(long, value_name = "FILE", value_parser = camera)]
     depth_camera: Option<CameraFile>,
     /// Take the colours of a film with depth alone.
@@ -38,8 +40,28 @@ fn unit(text: &str) -> Result<f64, String> {
     )
 }
 
+/// Parses `--depth-camera`: a camera, or a lens profile of one.
 fn camera(text: &str) -> Result<CameraFile, String> {
-    CameraFile::read(Path::new(text)).map_err(|e| e.to_string())
+    let path = Path::new(text);
+    CameraFile::read(path).or_else(|e| of_profile(path).ok_or_else(|| e.to_string()))
+}
+
+/// The camera of a lens profile, as `calibrate` writes it; `None` where the file is none, or of a fisheye.
+fn of_profile(path: &Path) -> Option<CameraFile> {
+    let lens = read_lens_profile(&std::fs::read(path).ok()?).ok()?;
+    let Distortion::RadialTangential(distortion) = lens.distortion else {
+        return None;
+    };
+    Some(CameraFile {
+        size: Some(lens.size),
+        pinhole: Pinhole {
+            focal_px: lens.focal_px,
+            middle_px: lens.middle_px,
+        },
+        distortion: distortion.to_vec(),
+        unit_m: None,
+        depth: None,
+    })
 }
 
 impl DepthArgs {
@@ -50,6 +72,7 @@ impl DepthArgs {
             let pinhole = file.pinhole;
             (depth.fx_px, depth.fy_px) = (pinhole.focal_px.x, pinhole.focal_px.y);
             (depth.cx_px, depth.cy_px) = (pinhole.middle_px.x, pinhole.middle_px.y);
+            depth.distortion = file.distortion.clone();
             depth.own_camera = file.depth.iter().cloned().collect();
             depth.unit_m = file.unit_m.unwrap_or(depth.unit_m);
         }

@@ -143,16 +143,18 @@ impl GrowArgs {
             Some(threads) => usize::from(threads),
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
-        let grow_one = |number: u64| -> Result<(), PrepareError> {
-            let tree = parent.offspring(self.seed, number)?;
-            parent.write(&self.out.join(tree_name(number)), tree)?;
-            Ok(())
-        };
+        let grow_one = |number| self.grow_one(parent, number);
         let grown = in_parallel(count, threads, is_stopped, &grow_one, &|done| bar.set(done));
         grown.map_err(|undone| match undone {
             Undone::Stopped => CommandError::Stopped,
             Undone::Failed(e) => e.into(),
         })
+    }
+
+    fn grow_one(&self, parent: &Parent, number: u64) -> Result<(), PrepareError> {
+        let tree = parent.offspring(self.seed, number)?;
+        parent.write(&self.out.join(tree_name(number)), tree)?;
+        Ok(())
     }
 
     /// # Errors

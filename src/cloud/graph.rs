@@ -73,10 +73,8 @@ impl Ways {
 }
 
 impl Graph {
-    /// Joins all points nearer to each other than `reach`; gaps of up to `widest` between what
-    /// hangs together are bridged at their narrowest, the narrowest first (Boruvka's tree of
-    /// pieces).
-    pub fn new(points: &[Point3<f32>], reach: f32, widest: f32) -> Self {
+    /// Joins all points nearer to each other than `reach`.
+    pub fn new(points: &[Point3<f32>], reach: f32) -> Self {
         let grid = Grid::new(points, reach);
         let mut graph = Self {
             starts: Vec::with_capacity(points.len() + 1),
@@ -94,8 +92,15 @@ impl Graph {
             });
         }
         graph.starts.push(graph.ends.len() as u32);
-        let bridges = bridges(points, &grid, &graph.pieces(), widest);
-        graph.with(&bridges)
+        graph
+    }
+
+    /// The same with gaps of up to `widest` between what hangs together bridged at their narrowest,
+    /// the narrowest first (Boruvka's tree of pieces). Gaps are wider than `reach`.
+    pub fn bridged(self, points: &[Point3<f32>], reach: f32, widest: f32) -> Self {
+        let grid = Grid::new(points, reach);
+        let bridges = bridges(points, &grid, &self.pieces(), widest);
+        self.with(&bridges)
     }
 
     /// Of so many points and these edges, each from the point that it stands beside.
@@ -372,7 +377,7 @@ mod tests {
             (0..5).map(|i| Point3::new(i as f32, 0.0, 0.0)).collect();
         points.extend((0..3).map(|i| Point3::new(6.0 + i as f32, 0.0, 0.0)));
         points.push(Point3::new(30.0, 0.0, 0.0));
-        let graph = Graph::new(&points, 1.5, 4.0);
+        let graph = Graph::new(&points, 1.5).bridged(&points, 1.5, 4.0);
         assert_eq!(graph.pieces(), [0, 0, 0, 0, 0, 0, 0, 0, 1]);
         let ways = graph.shortest_ways(&[0]);
         assert_eq!(ways.length[7], 4.0 + GAP_COST * 2.0 + 2.0);

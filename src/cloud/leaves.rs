@@ -34,11 +34,10 @@ const LEAVES_OF_TWIG: f64 = 3.0;
 /// Which of the points are wood. `cell` is their distance; `ways` lead to the foot.
 pub(super) fn is_wood(points: &[Point3<f32>], graph: &Graph, ways: &Ways, cell: f32) -> Vec<bool> {
     let normals = normals(points, cell);
-    let face_alike = |a: u32, b: u32| {
+    let segment_of = graph.pieces_where(|a, b| {
         normals[a as usize].dot(&normals[b as usize]).abs() > LEAST_COSINE
             && (points[a as usize] - points[b as usize]).norm() < REACH_CELLS * cell
-    };
-    let segment_of = graph.pieces_where(face_alike);
+    });
     let segments = Segment::all(points, &segment_of);
     let leaf = Segment::leaf(&segments);
     let likely: Vec<bool> = segments.iter().map(|s| s.is_likely_wood(&leaf)).collect();
@@ -144,8 +143,7 @@ impl Segment {
     /// The middle one of the segments that are no specks and no lines, in size and in length: a
     /// leaf as the scan shows it.
     fn leaf(segments: &[Self]) -> Self {
-        let is_flat = |s: &&Self| s.count >= SIZES[0] && s.linearity < LINEARITIES[0];
-        let flat: Vec<Self> = segments.iter().filter(is_flat).copied().collect();
+        let flat: Vec<&Self> = segments.iter().filter(|s| s.is_flat()).collect();
         let counts = flat.iter().map(|s| s.count).collect();
         let lengths = flat.iter().map(|s| s.length).collect();
         Self {
@@ -153,6 +151,11 @@ impl Segment {
             linearity: 0.0,
             length: median(lengths, f64::total_cmp).unwrap_or(0.0),
         }
+    }
+
+    /// Whether it is no speck and no line.
+    fn is_flat(&self) -> bool {
+        self.count >= SIZES[0] && self.linearity < LINEARITIES[0]
     }
 
     fn is_likely_wood(&self, leaf: &Self) -> bool {
@@ -195,7 +198,7 @@ mod tests {
                 points.push(at + nalgebra::Vector3::new(x, y, slope * x));
             }
         }
-        let graph = Graph::new(&points, 0.018, 0.2);
+        let graph = Graph::new(&points, 0.018).bridged(&points, 0.018, 0.2);
         let ways = graph.shortest_ways(&[0]);
         let is_wood = is_wood(&points, &graph, &ways, 0.01);
         let wood_of = |part: &[bool]| part.iter().filter(|w| **w).count() as f64;

@@ -5,6 +5,7 @@
 //! lines by the shortest ways from there ([`levels`]) or by space colonisation ([`colonise`]);
 //! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]).
 
+mod base;
 mod circle;
 mod colonise;
 mod error;
@@ -144,7 +145,7 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
         for (point, thinned) in standing.of_cloud.iter().zip(&coarse.thinned.of_point) {
             found.tree_of_point[*point as usize] = (*thinned != u32::MAX).then_some(0);
         }
-        let linked = Linked::of(coarse.thinned, cell, GAP_SHARE * standing.height);
+        let linked = coarse.bridged(GAP_SHARE * standing.height);
         found
             .trees
             .push(tree_of(&standing, linked, options, figures));
@@ -199,11 +200,21 @@ impl Linked {
 
     /// Gaps are led over up to `widest`.
     fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
-        let graph = Graph::new(&thinned.points, REACH_CELLS * cell, widest);
+        let graph = Graph::new(&thinned.points, REACH_CELLS * cell);
         Self {
             thinned,
             cell,
             graph,
+        }
+        .bridged(widest)
+    }
+
+    /// The same with wider gaps led over.
+    fn bridged(self, widest: f32) -> Self {
+        let reach = REACH_CELLS * self.cell;
+        Self {
+            graph: self.graph.bridged(&self.thinned.points, reach, widest),
+            ..self
         }
     }
 
@@ -256,7 +267,7 @@ fn tree_of(
     let by_levels = levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell);
     let raw = match options.method {
         CloudMethod::Paths => by_levels,
-        CloudMethod::Colonisation => colonise::colonise(&by_levels.contracted(points), base, cell),
+        CloudMethod::Colonisation => colonise::colonise(&by_levels, points, base, cell),
     };
     let mut paths = raw.paths();
     let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());
@@ -275,7 +286,7 @@ fn tree_of(
     refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
     paths::prune(&mut paths, least);
     let noise = radius::noise(&paths);
-    stand_on(&mut paths, base);
+    base::stand(&mut paths, base, |at| standing.ground_at(at));
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
     radius::assign(&mut paths, figures.twig_radius_m);
@@ -313,16 +324,15 @@ impl Standing {
                 least: LEAST_POINTS,
             });
         }
-        let bounds = [0, 1, 2].map(|axis| Extent::of(all, axis));
-        let [wide, deep, height] = bounds.map(|b| b.size);
+        let bounds = Bounds::of(all);
+        let [wide, deep, height] = bounds.sizes();
         if height <= 0.0 || wide.max(deep) <= 0.0 {
             return Err(CloudError::Flat);
         }
-        let is_near = |p: &Point3<f32>| bounds.iter().zip(p.iter()).all(|(b, x)| b.holds(*x));
-        let mut points: Vec<Point3<f32>> = all.iter().copied().filter(is_near).collect();
+        let mut points: Vec<Point3<f32>> = all.iter().copied().filter(|p| bounds.hold(p)).collect();
         figures.noise = all.len() - points.len();
         let ground = Ground::of(&points, height).map(Arc::new);
-        let of_all = (0..).zip(all).filter(|(_, at)| is_near(at));
+        let of_all = (0..).zip(all).filter(|(_, at)| bounds.hold(at));
         let mut of_cloud: Vec<u32> = of_all.map(|(place, _)| place).collect();
         if let Some(ground) = &ground {
             let before = points.len();
@@ -383,6 +393,12 @@ impl Standing {
         above
     }
 
+    /// How high the ground is at a place, where any was scanned.
+    fn ground_at(&self, at: &Point3<f64>) -> Option<f64> {
+        let ground = self.ground.as_ref()?;
+        Some(ground.height_at(at.x as f32, at.y as f32).into())
+    }
+
     /// The foot below the lowest points of the trunk: in their middle, on the ground.
     fn foot_below(&self, points: &[Point3<f32>], lowest: &[u32]) -> Point3<f64> {
         let mut sum = Vector3::zeros();
@@ -394,11 +410,7 @@ impl Standing {
             .iter()
             .map(|p| f64::from(points[*p as usize].z))
             .fold(foot.z, f64::min);
-        if let Some(ground) = &self.ground {
-            foot.z = foot
-                .z
-                .min(f64::from(ground.height_at(foot.x as f32, foot.y as f32)));
-        }
+        foot.z = self.ground_at(&foot).map_or(foot.z, |z| foot.z.min(z));
         foot
     }
 }
@@ -431,6 +443,25 @@ impl Extent {
 
     fn holds(&self, x: f32) -> bool {
         (self.low - self.size..=self.low + 2.0 * self.size).contains(&x)
+    }
+}
+
+/// Where most points lie along each axis.
+#[derive(Clone, Copy, Debug)]
+struct Bounds([Extent; 3]);
+
+impl Bounds {
+    fn of(points: &[Point3<f32>]) -> Self {
+        Self([0, 1, 2].map(|axis| Extent::of(points, axis)))
+    }
+
+    fn sizes(&self) -> [f32; 3] {
+        self.0.map(|extent| extent.size)
+    }
+
+    fn hold(&self, point: &Point3<f32>) -> bool {
+        let mut along = self.0.iter().zip(point.iter());
+        along.all(|(extent, x)| extent.holds(*x))
     }
 }
 
@@ -523,13 +554,4 @@ fn reach_tips(paths: &mut [Path], points: &[Point3<f32>]) {
             .map(|p| (points[*p as usize].cast::<f64>() - tip.at).dot(&along));
         tip.at += along * ahead.fold(0.0, f64::max);
     }
-}
-
-/// Lets the trunk begin on the ground, below its first place.
-fn stand_on(paths: &mut [Path], base: Point3<f64>) {
-    let Some(trunk) = paths.first_mut() else {
-        return;
-    };
-    let first = &mut trunk.places[0];
-    first.at.z = first.at.z.min(base.z);
 }

@@ -85,6 +85,12 @@ impl Path {
         way.try_normalize(1e-9).unwrap_or_else(Vector3::z)
     }
 
+    /// Distance of two places; 0 where there is none of the second.
+    pub fn apart(&self, place: usize, other: usize) -> f64 {
+        let other = self.places.get(other);
+        other.map_or(0.0, |other| (other.at - self.places[place].at).norm())
+    }
+
     /// Leads the line straight between two places: there its points are those of a fork, and its
     /// circles none of one limb.
     fn straighten(&mut self, from: usize, to: usize) {

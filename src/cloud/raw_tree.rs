@@ -32,6 +32,23 @@ impl RawTree {
         middle.collect()
     }
 
+    /// Places between nodes that are farther apart than `longest`, no two of them farther than that: where
+    /// the tree leads over a gap.
+    pub fn between(&self, longest: f64) -> Vec<Point3<f32>> {
+        let mut places = Vec::new();
+        for node in &self.nodes {
+            let Some(parent) = node.parent else {
+                continue;
+            };
+            let from = self.nodes[parent].at;
+            let pieces = ((node.at - from).norm() / longest).ceil();
+            for k in 1..pieces as usize {
+                places.push((from + (node.at - from) * (k as f64 / pieces)).cast());
+            }
+        }
+        places
+    }
+
     /// The tree as paths, each from where it leaves another one to its tip: at every fork the path
     /// goes on in the child that carries the greatest length of wood.
     pub fn paths(&self) -> Vec<Path> {

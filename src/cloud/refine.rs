@@ -65,14 +65,14 @@ impl Tube {
     fn of(paths: &[Path], path: usize, place: usize) -> Self {
         let own = &paths[path];
         let at = own.places[place].at;
-        let to_next = |k: usize| own.places.get(k).map_or(0.0, |p| (p.at - at).norm());
-        let before = place.checked_sub(1).map_or(0.0, to_next);
+        let before = place.checked_sub(1).map_or(0.0, |k| own.apart(k, place));
+        let after = own.apart(place, place + 1);
         Self {
             path: path as u32,
             place: place as u32,
             at,
             along: own.direction(place),
-            half_length: 0.5 * before.max(to_next(place + 1)),
+            half_length: 0.5 * before.max(after),
             radius: own.places[place].radius,
             carrier: own
                 .on

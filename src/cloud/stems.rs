@@ -192,7 +192,7 @@ mod tests {
     }
 
     fn found(points: &[Point3<f32>], height: f32) -> Stand {
-        let graph = Graph::new(points, 3.0 * CELL, 0.1 * height);
+        let graph = Graph::new(points, 3.0 * CELL).bridged(points, 3.0 * CELL, 0.1 * height);
         find(points, &graph, height, CELL)
     }
 

@@ -53,6 +53,13 @@ pub struct CloudFigures {
     pub height_m: f64,
 }
 
+impl CloudFigures {
+    /// Share of the cloud's points that so many are, percent.
+    pub fn percent(&self, points: usize) -> f64 {
+        100.0 * points as f64 / self.points.max(1) as f64
+    }
+}
+
 /// Puts the paths together; `cell` is the distance of points, m.
 pub(super) fn assemble(paths: &[Path], cell: f64) -> Vec<CloudNode> {
     let kept = kept_places(paths, STRAIGHT_CELLS * cell);

@@ -36,6 +36,20 @@ pub struct DepthCamera {
     pub translation_m: [f64; 3],
 }
 
+/// Refuses numbers that describe no distortion of a lens.
+///
+/// # Errors
+/// There are too many, or one is not finite: what is wrong, in one line.
+pub fn check_distortion(distortion: &[f64]) -> Result<(), String> {
+    if distortion.len() > 8 {
+        return Err("distortion has up to eight numbers".to_owned());
+    }
+    match distortion.iter().all(|k| k.is_finite()) {
+        true => Ok(()),
+        false => Err("each number of distortion must be finite".to_owned()),
+    }
+}
+
 /// Refuses a depth camera that cannot be one.
 ///
 /// # Errors
@@ -67,11 +81,8 @@ impl DepthCamera {
         if !(self.fx_px > 0.0 && self.fy_px > 0.0) {
             return Err("fx and fy must be numbers above 0".to_owned());
         }
-        if self.distortion.len() > 8 {
-            return Err("distortion has up to eight numbers".to_owned());
-        }
-        let numbers = [self.fx_px, self.fy_px, self.cx_px, self.cy_px];
-        let mut numbers = numbers.iter().chain(&self.distortion);
+        check_distortion(&self.distortion)?;
+        let mut numbers = [self.fx_px, self.fy_px, self.cx_px, self.cy_px].into_iter();
         if !numbers.all(|x| x.is_finite()) {
             return Err("each of its numbers must be finite".to_owned());
         }

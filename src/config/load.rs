@@ -141,6 +141,8 @@ impl Config {
             });
         }
         super::depth_camera::check(&self.depth.own_camera)?;
+        super::check_distortion(&self.depth.distortion)
+            .map_err(|what| ConfigError::DepthCamera { what })?;
         super::markers::check(&self.markers.windows, &self.markers.corrections)?;
         check_strokes(&self.skeleton.strokes_px)
     }

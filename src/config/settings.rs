@@ -148,6 +148,9 @@ settings! {
         cx_px: f64 [0 or more] = 0.0;
         /// Where the camera's axis meets the picture, px from the top.
         cy_px: f64 [0 or more] = 0.0;
+        /// How its lens distorts, up to eight numbers in the order of OpenCV: k1, k2, p1, p2, k3, k4, k5,
+        /// k6; `--depth-camera` sets it. Empty: as the film says where it says the camera, else not at all.
+        distortion: Vec<f64> = Vec::new();
         /// The depth camera, where its images are not registered with the colours, none or one:
         /// `[{width, height, fx_px, fy_px, cx_px, cy_px, rotation, translation_m}]`; `--depth-camera`
         /// sets it.

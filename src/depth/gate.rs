@@ -29,7 +29,27 @@ pub struct DepthGate {
 #[derive(Clone, Debug, Default)]
 struct Usual {
     first_m: Vec<f64>,
+    /// The median of the first ones; `None` until there are enough of them.
+    depth_m: Option<f64>,
     last_frame: u64,
+}
+
+impl Usual {
+    /// Whether the depth is none of this point's.
+    fn is_far_from(&self, depth_m: f64) -> bool {
+        self.depth_m
+            .is_some_and(|usual_m| (depth_m - usual_m).abs() > FARTHEST_SHARE * usual_m)
+    }
+
+    fn learn(&mut self, depth_m: f64) {
+        if self.first_m.len() == FIRST {
+            return;
+        }
+        self.first_m.push(depth_m);
+        if self.first_m.len() >= LEAST {
+            self.depth_m = median(self.first_m.clone(), f64::total_cmp);
+        }
+    }
 }
 
 impl DepthGate {
@@ -49,16 +69,10 @@ impl DepthGate {
         let depth_m = f64::from(depth.depth_m);
         let usual = self.points.entry(id).or_default();
         usual.last_frame = self.frame;
-        let first_m = &mut usual.first_m;
-        if first_m.len() >= LEAST {
-            let usual_m = median(first_m.clone(), f64::total_cmp).unwrap_or(depth_m);
-            if (depth_m - usual_m).abs() > FARTHEST_SHARE * usual_m {
-                return false;
-            }
+        if usual.is_far_from(depth_m) {
+            return false;
         }
-        if first_m.len() < FIRST {
-            first_m.push(depth_m);
-        }
+        usual.learn(depth_m);
         true
     }
 }

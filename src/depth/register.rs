@@ -34,9 +34,7 @@ impl Registration {
         }
         let colour = rig.colour.for_size(picture);
         let coarser = rig.depth.pinhole.focal_px.mean() / colour.pinhole.focal_px.mean();
-        let share = coarser.min(1.0);
-        let side = |px: u32| (f64::from(px) * share).round().max(1.0) as u32;
-        let colour = colour.for_size(Size::new(side(picture.width), side(picture.height)));
+        let colour = colour.for_size(picture.scaled(coarser.min(1.0)));
         let mut widest: f64 = 0.0;
         for corner_px in colour.size.corners_px() {
             widest = widest.max(colour.ray(corner_px)?.norm());

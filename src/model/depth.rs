@@ -91,6 +91,8 @@ impl DepthImage {
 pub struct DepthFormat {
     /// The colour camera, with which they are registered.
     pub pinhole: Pinhole,
+    /// How its lens distorts, as in [`CameraModel`](super::CameraModel); 0 where nobody knows.
+    pub distortion: [f64; 8],
     /// Metres for each count.
     pub unit_m: f64,
 }

@@ -32,6 +32,11 @@ impl CameraModel {
         }
     }
 
+    /// The numbers of a distortion of which only these first ones are given, in the same order.
+    pub fn coefficients(first: &[f64]) -> [f64; 8] {
+        std::array::from_fn(|k| first.get(k).copied().unwrap_or(0.0))
+    }
+
     /// Whether it is one: a size, focal lengths above 0, all numbers finite.
     pub fn is_valid(&self) -> bool {
         self.size.area() > 0

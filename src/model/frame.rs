@@ -22,6 +22,15 @@ impl Size {
         self.width as usize * self.height as usize
     }
 
+    /// A picture of this size made so many times as large, with a pixel at least.
+    pub fn scaled(self, share: f64) -> Self {
+        let [width, height] = [self.width, self.height].map(f64::from);
+        Self {
+            width: (width * share).round().max(1.0) as u32,
+            height: (height * share).round().max(1.0) as u32,
+        }
+    }
+
     /// Its corners, px.
     pub fn corners_px(self) -> [Point2<f64>; 4] {
         let (width, height) = (f64::from(self.width), f64::from(self.height));

@@ -294,21 +294,25 @@ fn number(head: &[u8], name: &str) -> Option<u64> {
     matches!(value.len(), 4 | 8).then(|| super::wire::little(value))
 }
 
+/// The connection that a record belongs to.
+fn connection_id(head: &[u8]) -> Option<u32> {
+    u32::try_from(number(head, "conn")?).ok()
+}
+
 /// What a record says; `None` where that is nothing for us.
 fn found(head: &[u8], data: &[u8]) -> Option<Found> {
-    let connection = || u32::try_from(number(head, "conn")?).ok();
     match field(head, "op")? {
         [op::MESSAGE] => {
             let mut time = Cursor(field(head, "time")?);
             let (seconds, nanos) = (time.u32()?, time.u32()?);
             Some(Found::Message {
-                connection: connection()?,
+                connection: connection_id(head)?,
                 time_ns: u64::from(seconds) * 1_000_000_000 + u64::from(nanos),
             })
         }
         // The data is a second head.
         [op::CONNECTION] => Some(Found::Connection(Connection {
-            id: connection()?,
+            id: connection_id(head)?,
             topic: text(head, "topic")?,
             kind: text(data, "type")?,
         })),

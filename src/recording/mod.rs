@@ -6,12 +6,15 @@
 
 mod bag;
 mod channel;
+mod contents;
 mod cursor;
 mod disk;
 mod error;
+mod foreign;
 mod image;
 mod pairing;
 mod reader;
+mod records;
 mod ros;
 mod scene;
 mod schema;
@@ -22,10 +25,11 @@ mod walk;
 mod wire;
 mod writer;
 
+pub use contents::About;
 pub use disk::SpaceReserve;
 pub use error::RecordingError;
 pub use image::{Encoding, Picture};
 pub use pairing::{AwaitsDepth, Pairing};
-pub use reader::{About, Reader};
+pub use reader::Reader;
 pub use series::{Head, Limits, Series};
 pub use track_file::{Sets, TrackFile, TrackFileReader};

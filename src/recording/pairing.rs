@@ -54,6 +54,13 @@ struct Timed {
     image: Arc<DepthImage>,
 }
 
+impl Timed {
+    /// How far it is from a time, ns.
+    fn apart_ns(&self, time_ns: i64) -> u64 {
+        self.time_ns.abs_diff(time_ns)
+    }
+}
+
 impl<P> Default for Pairing<P> {
     fn default() -> Self {
         Self {
@@ -102,14 +109,13 @@ impl<P: AwaitsDepth> Pairing<P> {
     pub fn oldest(&mut self) -> Option<P> {
         let mut picture = self.pictures.pop_front()?;
         let time_ns = picture.time_ns();
-        let apart = |depth: &Timed| depth.time_ns.abs_diff(time_ns);
-        let nearest = (0..self.depths.len()).min_by_key(|k| apart(&self.depths[*k]));
-        let nearest = nearest.filter(|k| apart(&self.depths[*k]) <= APART_NS);
+        let nearest = (0..self.depths.len()).min_by_key(|k| self.depths[*k].apart_ns(time_ns));
+        let nearest = nearest.filter(|k| self.depths[*k].apart_ns(time_ns) <= APART_NS);
         // The next picture may be nearer to it.
         let next = self.pictures.front().map(P::time_ns);
         let nearest = nearest.filter(|k| {
             let depth = &self.depths[*k];
-            next.is_none_or(|next| apart(depth) <= depth.time_ns.abs_diff(next))
+            next.is_none_or(|next| depth.apart_ns(time_ns) <= depth.apart_ns(next))
         });
         if let Some(k) = nearest {
             picture.set_depth(self.depths[k].image.clone());

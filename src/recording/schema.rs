@@ -53,6 +53,8 @@ pub(super) const CAPTURED_AT: &str = "captured_at";
 pub(super) const DEPTH_UNIT_M: &str = "depth_unit_m";
 pub(super) const DEPTH_CAMERA_PX: [&str; 4] =
     ["depth_fx_px", "depth_fy_px", "depth_cx_px", "depth_cy_px"];
+/// The distortion of its lens, up to eight numbers, where it is known.
+pub(super) const DEPTH_DISTORTION: &str = "depth_distortion";
 /// Begins the keys of the user's notes.
 pub(super) const NOTE: &str = "note.";
 

@@ -2,7 +2,8 @@
 
 use super::error::RecordingError;
 use super::schema::{
-    CAPTURED_AT, CLOCK, DEPTH_CAMERA_PX, DEPTH_UNIT_M, FIRST_SEQUENCE, NOTE, SHIFT_NS, Topic,
+    CAPTURED_AT, CLOCK, DEPTH_CAMERA_PX, DEPTH_DISTORTION, DEPTH_UNIT_M, FIRST_SEQUENCE, NOTE,
+    SHIFT_NS, Topic,
 };
 use super::writer::{Times, Writer};
 use super::{image, scene};
@@ -256,6 +257,10 @@ impl Series {
             entries.push((DEPTH_UNIT_M, depth.unit_m.to_string()));
             for (key, px) in DEPTH_CAMERA_PX.into_iter().zip(camera_px) {
                 entries.push((key, px.to_string()));
+            }
+            if depth.distortion.iter().any(|k| *k != 0.0) {
+                let numbers = depth.distortion.map(|k| k.to_string());
+                entries.push((DEPTH_DISTORTION, numbers.join(" ")));
             }
         }
         if let Some(number) = first.sequence {

@@ -10,7 +10,7 @@ use super::watched::Watched;
 use crate::config;
 use crate::model::{DepthCameraState, DepthCounts, RawFrame, nanoseconds};
 use crate::recording::Pairing;
-use crate::source::{DepthTally, Health, Source, SourceError, SourceInfo, Successor};
+use crate::source::{DepthTally, Health, Source, SourceError, SourceInfo};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -173,29 +173,12 @@ impl Source for WithDepth {
         self.camera.describe()
     }
 
-    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
-        self.camera.stop_when(stop);
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.camera)
     }
 
-    fn adopt(&mut self, config: &config::Camera) {
-        self.camera.adopt(config);
-    }
-
-    fn returns(&self) -> bool {
-        self.camera.returns()
-    }
-
-    fn reopen(&mut self) -> Result<(), SourceError> {
-        self.camera.reopen()
-    }
-
-    fn close(&mut self) {
-        self.camera.close();
-    }
-
-    /// It is watched over already.
-    fn successor(&self) -> Option<Successor> {
-        None
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.camera)
     }
 
     fn health(&self) -> Health {

@@ -12,12 +12,14 @@ use std::path::{Path, PathBuf};
 /// A longer file is something else, bytes.
 const LONGEST: u64 = 1 << 16;
 
-/// A camera without distortion, as a file has it.
+/// A camera, as a file has it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraFile {
     /// Size of the pictures that it is for; `None` where the file does not say.
     pub size: Option<Size>,
     pub pinhole: Pinhole,
+    /// How its lens distorts: up to eight numbers, as in [`CameraModel`].
+    pub distortion: Vec<f64>,
     /// Metres for each count of a depth image; `None` where the file does not say.
     pub unit_m: Option<f64>,
     /// The depth camera, where its images are not registered with the pictures.
@@ -49,6 +51,8 @@ struct Written {
     cx: Option<f64>,
     cy: Option<f64>,
     intrinsic_matrix: Option<[f64; 9]>,
+    #[serde(default)]
+    distortion: Vec<f64>,
     depth_unit_m: Option<f64>,
     depth: Option<DepthCamera>,
 }
@@ -79,11 +83,16 @@ impl CameraFile {
             own_camera: self.depth.iter().cloned().collect(),
             ..config::Depth::default()
         };
+        let camera = CameraModel {
+            size: picture,
+            pinhole: self.pinhole,
+            distortion: CameraModel::coefficients(&self.distortion),
+        };
         SaidOfDepth {
-            pinhole: Some(self.pinhole),
+            camera: Some(camera),
             unit_m: Some(self.unit_m.unwrap_or(unit_m)),
             is_in_metres: false,
-            rig: depth::rig(&own, CameraModel::new(picture, self.pinhole)),
+            rig: depth::rig(&own, camera),
         }
     }
 
@@ -97,6 +106,7 @@ impl CameraFile {
         if !pinhole.is_valid() {
             return Err("fx and fy must be numbers above 0".to_owned());
         }
+        config::check_distortion(&written.distortion)?;
         let unit_m = written.depth_unit_m;
         if unit_m.is_some_and(|unit_m| !(unit_m > 0.0 && unit_m <= 1.0)) {
             return Err("depth_unit_m must be above 0, at most 1".to_owned());
@@ -108,6 +118,7 @@ impl CameraFile {
         Ok(Self {
             size: sides.map(|(width, height)| Size::new(width, height)),
             pinhole,
+            distortion: written.distortion,
             unit_m,
             depth: written.depth,
         })
@@ -142,7 +153,7 @@ mod tests {
     fn numbers_and_the_matrix_of_open3d_are_the_same_camera() {
         let numbers = CameraFile::parse(
             r#"{"width": 640, "height": 480, "fx": 525, "fy": 520.5, "cx": 319.5, "cy": 239.5,
-                "depth_unit_m": 0.0002}"#,
+                "distortion": [-0.2, 0.05], "depth_unit_m": 0.0002}"#,
         )
         .expect("a camera");
         let matrix = CameraFile::parse(
@@ -151,6 +162,7 @@ mod tests {
         )
         .expect("a camera");
         assert_eq!(numbers.pinhole, matrix.pinhole);
+        assert_eq!(numbers.distortion, [-0.2, 0.05]);
         assert_eq!(numbers.size, Some(Size::new(640, 480)));
         assert_eq!((numbers.unit_m, matrix.unit_m), (Some(0.0002), None));
     }
@@ -180,6 +192,7 @@ mod tests {
             r#"{"fx": -1e400, "fy": 525, "cx": 1, "cy": 1}"#,
             r#"{"intrinsic_matrix": [1, 2]}"#,
             r#"{"fx": 525, "fy": 525, "cx": 1, "cy": 1, "depth_unit_m": 5000}"#,
+            r#"{"fx": 525, "fy": 525, "cx": 1, "cy": 1, "distortion": [1, 2, 3, 4, 5, 6, 7, 8, 9]}"#,
         ] {
             let said = CameraFile::parse(bad).expect_err(bad);
             assert!(!said.contains('\n'), "{said}");

@@ -5,11 +5,10 @@ use super::depth_format::{KnownDepth, SaidOfDepth};
 use super::error::SourceError;
 use super::interface::{Health, Source, SourceInfo, Successor};
 use super::v4l2;
-use crate::config::{self, Config};
+use crate::config::Config;
 use crate::model::{DepthFormat, DepthImage, PixelFormat, RawFrame, Size};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// A V4L2 device with depth. Its frames have a depth image and no picture.
 pub(super) struct DepthCamera {
@@ -74,24 +73,12 @@ impl Source for DepthCamera {
         }
     }
 
-    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
-        self.camera.stop_when(stop);
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.camera)
     }
 
-    fn adopt(&mut self, config: &config::Camera) {
-        self.camera.adopt(config);
-    }
-
-    fn returns(&self) -> bool {
-        self.camera.returns()
-    }
-
-    fn reopen(&mut self) -> Result<(), SourceError> {
-        self.camera.reopen()
-    }
-
-    fn close(&mut self) {
-        self.camera.close();
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.camera)
     }
 
     fn successor(&self) -> Option<Successor> {
@@ -140,24 +127,12 @@ impl Source for Beside {
         }
     }
 
-    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
-        self.camera.stop_when(stop);
+    fn wrapped(&self) -> Option<&dyn Source> {
+        Some(&*self.camera)
     }
 
-    fn adopt(&mut self, config: &config::Camera) {
-        self.camera.adopt(config);
-    }
-
-    fn returns(&self) -> bool {
-        self.camera.returns()
-    }
-
-    fn reopen(&mut self) -> Result<(), SourceError> {
-        self.camera.reopen()
-    }
-
-    fn close(&mut self) {
-        self.camera.close();
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        Some(&mut *self.camera)
     }
 
     fn successor(&self) -> Option<Successor> {
@@ -173,13 +148,5 @@ impl Source for Beside {
 
     fn take_depth_camera(&mut self) -> Option<Box<dyn Source>> {
         self.depth.take()
-    }
-
-    fn health(&self) -> Health {
-        self.camera.health()
-    }
-
-    fn warnings(&mut self) -> Vec<String> {
-        self.camera.warnings()
     }
 }

@@ -3,7 +3,7 @@
 use super::error::SourceError;
 use crate::config;
 use crate::depth::{self, Registration};
-use crate::model::{CameraModel, DepthFormat, DepthImage, DepthRig, Pinhole, Size};
+use crate::model::{CameraModel, DepthFormat, DepthImage, DepthRig, Size};
 use std::path::Path;
 
 /// By how much the proportions of depth image and picture may differ.
@@ -13,7 +13,7 @@ const SAME_VIEW: f64 = 0.01;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct SaidOfDepth {
     /// The colour camera.
-    pub pinhole: Option<Pinhole>,
+    pub camera: Option<CameraModel>,
     pub unit_m: Option<f64>,
     /// The unit is part of the format: the user cannot know better.
     pub is_in_metres: bool,
@@ -40,8 +40,9 @@ impl SaidOfDepth {
         settings: &config::Depth,
         picture: Size,
     ) -> Result<KnownDepth, SourceError> {
-        let of_rig = self.rig.map(|rig| rig.colour.for_size(picture).pinhole);
-        let Some(pinhole) = depth::pinhole(settings).or(self.pinhole).or(of_rig) else {
+        let of_rig = self.rig.map(|rig| rig.colour.for_size(picture));
+        let given = depth::colour_camera(settings, picture);
+        let Some(camera) = given.or(self.camera).or(of_rig) else {
             return Err(SourceError::bad_format(
                 path,
                 "nothing says what camera its depth belongs to; give --depth-camera FILE, or --no-depth \
@@ -57,7 +58,7 @@ impl SaidOfDepth {
             ));
         };
         let mut registration = None;
-        if let Some(rig) = self.rig(settings, pinhole, picture) {
+        if let Some(rig) = self.rig(settings, camera) {
             let usable = Registration::new(&rig, picture, unit_m).ok_or_else(|| {
                 let what = "the cameras of its depth and of its pictures make no sense; give \
                             --depth-camera FILE, or --no-depth for the colours alone";
@@ -66,21 +67,24 @@ impl SaidOfDepth {
             registration = Some(usable?);
         }
         Ok(KnownDepth {
-            format: DepthFormat { pinhole, unit_m },
+            format: DepthFormat {
+                pinhole: camera.pinhole,
+                distortion: camera.distortion,
+                unit_m,
+            },
             picture,
             registration,
         })
     }
 
     /// Both cameras, where the depth is not registered; the user's go before those of the film.
-    fn rig(&self, settings: &config::Depth, pinhole: Pinhole, picture: Size) -> Option<DepthRig> {
-        let given = CameraModel::new(picture, pinhole);
-        if let Some(rig) = depth::rig(settings, given) {
+    fn rig(&self, settings: &config::Depth, camera: CameraModel) -> Option<DepthRig> {
+        if let Some(rig) = depth::rig(settings, camera) {
             return Some(rig);
         }
         let rig = self.rig?;
         let colour = match depth::pinhole(settings) {
-            Some(_) => given,
+            Some(_) => camera,
             None => rig.colour,
         };
         Some(DepthRig { colour, ..rig })

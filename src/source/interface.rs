@@ -40,6 +40,9 @@ pub type Successor = Box<dyn Fn() -> Box<dyn Source> + Send>;
 
 /// A sequence of frames. Any call to a live one may block for as long as its driver does, or for
 /// ever; `runtime` makes them on a thread that it can leave behind.
+///
+/// A source around another one gives it in [`wrapped`](Self::wrapped) and
+/// [`wrapped_mut`](Self::wrapped_mut): what it does not answer itself, the other one is asked for.
 pub trait Source: Send {
     /// Waits for the next frame; `None` is the end, and stays it.
     ///
@@ -50,21 +53,39 @@ pub trait Source: Send {
 
     fn describe(&self) -> SourceInfo;
 
+    /// The source that this one is put around.
+    fn wrapped(&self) -> Option<&dyn Source> {
+        None
+    }
+
+    /// The same, to be changed.
+    fn wrapped_mut(&mut self) -> Option<&mut dyn Source> {
+        None
+    }
+
     /// What a file says of the making of its film. A camera knows nothing of it: its first frame
     /// is from now.
     fn origin(&self) -> Origin {
-        Origin::default()
+        self.wrapped().map_or_else(Origin::default, Source::origin)
     }
 
     /// A source that may wait long gives up, and returns `None`, soon after this has been set.
-    fn stop_when(&mut self, _stop: Arc<AtomicBool>) {}
+    fn stop_when(&mut self, stop: Arc<AtomicBool>) {
+        if let Some(source) = self.wrapped_mut() {
+            source.stop_when(stop);
+        }
+    }
 
     /// Takes over what can be changed of `config` while frames flow: the limits of time.
-    fn adopt(&mut self, _config: &config::Camera) {}
+    fn adopt(&mut self, config: &config::Camera) {
+        if let Some(source) = self.wrapped_mut() {
+            source.adopt(config);
+        }
+    }
 
     /// Whether it may come back after a failure, as a camera does that is plugged in again.
     fn returns(&self) -> bool {
-        false
+        self.wrapped().is_some_and(Source::returns)
     }
 
     /// One attempt to go on after a failure: the same camera, the same format. The caller
@@ -75,6 +96,9 @@ pub trait Source: Send {
     /// It is not back: `Absent` where it is not even there, which costs next to nothing to find
     /// out.
     fn reopen(&mut self) -> Result<(), SourceError> {
+        if let Some(source) = self.wrapped_mut() {
+            return source.reopen();
+        }
         Err(SourceError::Absent {
             input: self.describe().name,
             hint: "it cannot be opened again",
@@ -82,10 +106,15 @@ pub trait Source: Send {
     }
 
     /// Gives the device back after a failure, so that it can go and come back.
-    fn close(&mut self) {}
+    fn close(&mut self) {
+        if let Some(source) = self.wrapped_mut() {
+            source.close();
+        }
+    }
 
     /// How to go on with the same camera if a call to its driver never returns; `None` where there
-    /// is no other way than to wait for that call.
+    /// is no other way than to wait for that call. That of a wrapped source would lack what is around
+    /// it, and is not given.
     fn successor(&self) -> Option<Successor> {
         None
     }
@@ -97,12 +126,12 @@ pub trait Source: Send {
     }
 
     fn health(&self) -> Health {
-        Health::default()
+        self.wrapped().map_or_else(Health::default, Source::health)
     }
 
     /// Lines to show to the user since the last call, e.g. that a clip ends early; complete after
     /// the end.
     fn warnings(&mut self) -> Vec<String> {
-        Vec::new()
+        self.wrapped_mut().map_or_else(Vec::new, Source::warnings)
     }
 }

@@ -65,19 +65,21 @@ struct Cut {
 pub fn kinect_rig(text: &str, depth: Size, colour: Size) -> Result<DepthRig, String> {
     let text = text.trim_start_matches('\u{feff}').trim_end_matches('\0');
     let written: Written = serde_json::from_str(text).map_err(|e| one_line(&e.to_string()))?;
-    let camera = |purpose: &str| {
-        let mut cameras = written.information.cameras.iter();
-        let found = cameras.find(|camera| camera.purpose.ends_with(purpose));
-        found.ok_or_else(|| format!("it has no {purpose}"))
-    };
-    let of_depth = camera("CameraPurposeDepth")?;
-    let of_colour = camera("CameraPurposePhotoVideo")?;
-    let place = |camera: &Camera| camera.rt.place().ok_or("a camera stands nowhere");
+    let of_depth = written.information.camera("CameraPurposeDepth")?;
+    let of_colour = written.information.camera("CameraPurposePhotoVideo")?;
     Ok(DepthRig {
         depth: of_depth.model(depth, &depth_cut(depth)?)?,
         colour: of_colour.model(colour, &colour_cut(colour)?)?,
-        colour_from_depth: place(of_colour)? * place(of_depth)?.inverse(),
+        colour_from_depth: of_colour.rt.place()? * of_depth.rt.place()?.inverse(),
     })
+}
+
+impl Information {
+    fn camera(&self, purpose: &str) -> Result<&Camera, String> {
+        let mut cameras = self.cameras.iter();
+        let found = cameras.find(|camera| camera.purpose.ends_with(purpose));
+        found.ok_or_else(|| format!("it has no {purpose}"))
+    }
 }
 
 /// The modes of the depth camera: its sensor has 1024 by 1024 pixels, and the narrow modes read a part.
@@ -165,13 +167,13 @@ impl Camera {
 }
 
 impl Place {
-    fn place(&self) -> Option<Isometry3<f64>> {
+    fn place(&self) -> Result<Isometry3<f64>, String> {
         let mut numbers = self.rotation.iter().chain(&self.translation);
         if !numbers.all(|x| x.is_finite()) {
-            return None;
+            return Err("a camera stands nowhere".to_owned());
         }
         let turn = Rotation3::from_matrix(&Matrix3::from_row_slice(&self.rotation));
-        Some(Isometry3::from_parts(
+        Ok(Isometry3::from_parts(
             Translation3::from(self.translation),
             UnitQuaternion::from_rotation_matrix(&turn),
         ))

@@ -105,9 +105,8 @@ impl Photograph {
         let whole = whole.ok_or_else(|| bad_format("the frame is not whole"))?;
         let reduced = match scale < 1.0 {
             true => {
-                let side = |px: u32| (f64::from(px) * scale).round().max(1.0) as u32;
-                let (width, height) = (side(full_size.width), side(full_size.height));
-                resize(&whole, width, height, FilterType::Triangle)
+                let reduced = full_size.scaled(scale);
+                resize(&whole, reduced.width, reduced.height, FilterType::Triangle)
             }
             false => whole,
         };

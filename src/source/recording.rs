@@ -106,7 +106,7 @@ impl Recording {
             return Ok(());
         };
         let said = SaidOfDepth {
-            pinhole: self.reader.depth_camera(size),
+            camera: self.reader.depth_camera(size),
             unit_m: self.reader.depth_unit_m(),
             is_in_metres: self.reader.is_depth_in_metres(),
             rig: self.reader.depth_rig(),

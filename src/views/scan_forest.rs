@@ -50,13 +50,15 @@ pub fn scan_forest(
     let bottom = heights.iter().copied().fold(f64::INFINITY, f64::min);
     let top = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let relief_m = top - bottom;
-    let of_relief = |z: &f64| ((z - bottom) / relief_m.max(1e-9) * f64::from(u16::MAX)) as u16;
+    let relief = heights.iter().map(|z| (z - bottom) / relief_m.max(1e-9));
     let ground = Ground {
         width_m: plot.width_m,
         depth_m: plot.depth_m,
         relief_m,
         samples: Size::new(GROUND_SAMPLES, GROUND_SAMPLES),
-        heights: heights.iter().map(of_relief).collect(),
+        heights: relief
+            .map(|share| (share * f64::from(u16::MAX)) as u16)
+            .collect(),
     };
     let mut standing = Vec::with_capacity(trees.len());
     for (template, tree) in trees.iter().enumerate() {

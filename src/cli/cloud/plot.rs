@@ -67,14 +67,13 @@ pub(super) fn write(
 fn print_found(scan: &Scan, found: &CloudTrees) {
     let figures = found.figures;
     let of_trees = found.tree_of_point.iter().flatten().count();
-    let share = |points: usize| 100.0 * points as f64 / figures.points.max(1) as f64;
     eprint_line(&format!(
         "{}: {} trees; of {} points {:.0} % are of trees and {:.0} % are ground",
         scan.name,
         found.trees.len(),
         figures.points,
-        share(of_trees),
-        share(figures.ground),
+        figures.percent(of_trees),
+        figures.percent(figures.ground),
     ));
 }
 
