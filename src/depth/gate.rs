@@ -45,21 +45,27 @@ impl DepthGate {
         }
     }
 
+    /// Whether a depth may be that of a point, by those that it has had.
+    pub fn may_be(&self, id: TrackId, depth: &DepthSeen) -> bool {
+        self.points.get(&id).is_none_or(|usual| usual.allows(depth))
+    }
+
     fn is_of(&mut self, id: TrackId, depth: &DepthSeen) -> bool {
-        let depth_m = f64::from(depth.depth_m);
         let usual = self.points.entry(id).or_default();
         usual.last_frame = self.frame;
-        let first_m = &mut usual.first_m;
-        if first_m.len() >= LEAST {
-            let usual_m = median(first_m.clone(), f64::total_cmp).unwrap_or(depth_m);
-            if (depth_m - usual_m).abs() > FARTHEST_SHARE * usual_m {
-                return false;
-            }
+        let is_allowed = usual.allows(depth);
+        if is_allowed && usual.first_m.len() < FIRST {
+            usual.first_m.push(f64::from(depth.depth_m));
         }
-        if first_m.len() < FIRST {
-            first_m.push(depth_m);
-        }
-        true
+        is_allowed
+    }
+}
+
+impl Usual {
+    fn allows(&self, depth: &DepthSeen) -> bool {
+        let depth_m = f64::from(depth.depth_m);
+        let usual_m = median(self.first_m.clone(), f64::total_cmp).unwrap_or(depth_m);
+        self.first_m.len() < LEAST || (depth_m - usual_m).abs() <= FARTHEST_SHARE * usual_m
     }
 }
 
