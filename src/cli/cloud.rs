@@ -9,8 +9,7 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
 use crate::cloud::{
-    CloudError, CloudMethod, CloudOptions, CloudTree, CloudTrees, PlacePair, Registration,
-    trees_of_cloud,
+    CloudError, CloudMethod, CloudOptions, CloudTree, CloudTrees, PlacePair, trees_of_cloud,
 };
 use crate::config::Config;
 use crate::document::Document;
@@ -19,7 +18,7 @@ use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_c
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
-use crate::views::{DrawnTree, FilmOnScan, register_film, scan_defaults, sway_on_scan};
+use crate::views::{DrawnTree, FilmFit, FilmOnScan, register_film, scan_defaults, sway_on_scan};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point3, Vector3};
@@ -178,12 +177,21 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let branches = drawn.skeleton.measured_branches().count();
     match args.film_on(&tree, &scan, &drawn)? {
         Some(film) => {
-            let (swaying, miss) = (film.branches(), 100.0 * film.registration.miss);
+            let swaying = film.branches();
             drawn.write_with_film(&args.out, &film)?;
             eprint_line(&format!(
-                "the film lies on the scan to {miss:.1} % of its height; {swaying} of {branches} \
-                 branches carry its frequencies"
+                "{}; {swaying} of {branches} branches carry its frequencies",
+                lies_on(&film.fit)
             ));
+            if let Some(lean) = film.fit.lean.filter(|_| film.fit.is_rest_unsure()) {
+                eprint_line(&format!(
+                    "arborcam: warning: the tree leans in the film, or the camera was rolled, by {:.1} degrees; \
+                     places at rest may be off by {:.1} % of the height. Hang a tag upright beside \
+                     the trunk (--tag)",
+                    lean.angle.to_degrees(),
+                    100.0 * lean.rest_off_hi
+                ));
+            }
         }
         None => drop(drawn.write(&args.out)?),
     }
@@ -304,8 +312,8 @@ impl CloudArgs {
             };
             pairs.0.iter().map(against_foot).collect::<Vec<_>>()
         });
-        let registration = register_film(tree, &film, pairs.as_deref()).filter(Registration::holds);
-        let registration = registration.ok_or_else(|| {
+        let fit = register_film(tree, &film, pairs.as_deref()).filter(FilmFit::holds);
+        let fit = fit.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
                 None => "it is not found from where it was filmed; give three places in both with --pairs",
@@ -313,8 +321,22 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &registration);
-        Ok(Some(FilmOnScan { registration, sway }))
+        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &fit.registration);
+        Ok(Some(FilmOnScan { fit, sway }))
+    }
+}
+
+/// How well a film lies on a scan.
+fn lies_on(fit: &FilmFit) -> String {
+    match fit.off_hi {
+        Some(off) => format!(
+            "the film lies on the scan within {:.1} % of its height",
+            100.0 * off
+        ),
+        None => format!(
+            "the film lies on the scan to {:.1} % of its height",
+            100.0 * fit.registration.miss
+        ),
     }
 }
 
