@@ -63,8 +63,8 @@ impl Hsv {
 }
 
 /// Which hues a marker has and what is around it has not: the histogram of CamShift (Bradski 1998),
-/// weighted by that of the rest of the picture. A hue counts by the probability that a pixel of it is
-/// the marker (Bayes): what is found on leaves or bricks, too, counts for little. 255 at the surest hue.
+/// weighted by how probable it is that a pixel of a hue is the marker (Bayes): what is found on leaves or
+/// bricks, too, counts for little. 255 at the hue that counts most.
 #[derive(Clone, Debug)]
 pub struct HueModel {
     bins: Vec<f32>,
@@ -149,12 +149,13 @@ impl HueModel {
     }
 }
 
-/// How probable it is that a pixel of a hue is the marker, which has this hue in the first share of its
-/// pixels, the rest of the picture in the second.
+/// What a hue counts, which the marker has in the first share of its pixels and the rest of the picture
+/// in the second: by its frequency (Bradski 1998), times how probable it is that a pixel of it is the
+/// marker (Bayes). What the marker has little of counts for little, however rare it is elsewhere.
 fn by_hue((own, elsewhere): (&f32, &f32)) -> f32 {
     let marker = MARKER_SHARE * own;
     let rest = (1.0 - MARKER_SHARE) * elsewhere.max(LEAST_ELSEWHERE);
-    marker / (marker + rest)
+    own * marker / (marker + rest)
 }
 
 /// Of the pixels outside of these areas the share of each bin of hues; the rest has no hue.
@@ -299,5 +300,19 @@ impl Blob {
     /// The radius of a disc of this size, px.
     pub fn radius_px(&self) -> f64 {
         (self.mass_px / std::f64::consts::PI).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hue_counts_by_its_frequency_and_by_what_else_has_it() {
+        let alone = by_hue((&0.9, &0.0));
+        // A rim of another hue, which is rare in the picture.
+        assert!(by_hue((&0.1, &0.0)) < 0.2 * alone);
+        // A wall of the marker's hue.
+        assert!(by_hue((&0.9, &0.2)) < 0.1 * alone);
     }
 }

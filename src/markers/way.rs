@@ -11,6 +11,8 @@ const SURPRISE_SHARE: f64 = 0.05;
 /// A sight is no farther from where it was expected than so many usual surprises: one in ten thousand
 /// is, of a normal distribution in the plane.
 const GATE_SURPRISES: f64 = 3.0;
+/// Between two frames, where nothing was seen in two that follow, s.
+const USUAL_INTERVAL_S: f64 = 1.0 / 30.0;
 /// A marker that is not seen goes straight on for so long, s; then it swings back.
 const COAST_S: f64 = 0.1;
 /// How far a marker sways is known when it has been seen for so long, s: a period of a slow tree.
@@ -125,9 +127,8 @@ impl Way {
     /// How far from its straight way it may be. A place that was extrapolated from place and speed is
     /// wrong by the time to the power of 1.5 if the acceleration is white noise.
     fn reach_px(&self, time_s: f64) -> f64 {
-        let frames = self
-            .interval_s
-            .map_or(1.0, |s| ((time_s - self.seen_s) / s).max(1.0));
+        let interval_s = self.interval_s.unwrap_or(USUAL_INTERVAL_S);
+        let frames = ((time_s - self.seen_s) / interval_s).max(1.0);
         // Half covered, its middle is off by up to half of its radius.
         self.radius_px + GATE_SURPRISES * self.surprise_px2.sqrt() * frames.powf(1.5)
     }

@@ -31,9 +31,9 @@ const SDS: f64 = 2.0;
 /// A film that lies on the scan no better than this, as a share of the height, is not found.
 const LARGEST_OFF: f64 = 0.02;
 /// Standard deviation of the roll of a camera that was set up level, and of a tag that was hung
-/// upright, radians: guesses, one and half a degree.
-const CAMERA_ROLL_SD: f64 = 0.0175;
-const TAG_ROLL_SD: f64 = 0.0087;
+/// upright, degrees: guesses.
+const CAMERA_ROLL_SD_DEG: f64 = 1.0;
+const TAG_HANGS_SD_DEG: f64 = 0.5;
 
 /// A straight piece of filmed wood in the picture's plane, px, y up, the foot at the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,8 +68,9 @@ pub struct Lean {
 pub enum Upright {
     /// The camera was set up level, more or less.
     Camera,
-    /// From the upright of the picture to that of a tag, clockwise, radians.
-    Tag { roll: f64 },
+    /// From the upright of the picture to that of a tag, clockwise, and the standard deviation of that by
+    /// the edges of the tag.
+    Tag { roll_deg: f64, sd_deg: f64 },
 }
 
 impl FilmFit {
@@ -119,8 +120,11 @@ impl FilmFit {
         let lean = upright.map(|upright| {
             let roll = registration.to_picture.isometry.rotation.angle();
             let (angle, sd) = match upright {
-                Upright::Camera => (-roll, CAMERA_ROLL_SD),
-                Upright::Tag { roll: tag } => (-roll - tag, TAG_ROLL_SD),
+                Upright::Camera => (-roll, CAMERA_ROLL_SD_DEG.to_radians()),
+                Upright::Tag { roll_deg, sd_deg } => (
+                    -roll - roll_deg.to_radians(),
+                    TAG_HANGS_SD_DEG.hypot(sd_deg).to_radians(),
+                ),
             };
             Lean {
                 angle,
@@ -467,7 +471,10 @@ mod tests {
             "nobody knows how level the camera was"
         );
         // A tag that hangs upright says that it is the camera that is rolled.
-        let tag = Upright::Tag { roll: 0.04 };
+        let tag = Upright::Tag {
+            roll_deg: 0.04_f64.to_degrees(),
+            sd_deg: 0.2,
+        };
         let rolled = FilmFit::by_lines(near, &film, &scan(), Some(tag)).expect("a fit");
         assert!(off_share(&rolled.at_rest(), &leaning) < 0.003);
         assert!(!rolled.is_rest_unsure(), "{rolled:?}");

@@ -46,7 +46,8 @@ fn upright_in_wind(film: &Document) -> Option<Upright> {
     let is_wind = swaying.map(|s| s.excitation).any(|e| e == Excitation::Wind);
     is_wind.then(|| match &film.note.tag {
         Some(tag) => Upright::Tag {
-            roll: tag.roll_deg.to_radians(),
+            roll_deg: tag.roll_deg,
+            sd_deg: tag.roll_sd_deg,
         },
         None => Upright::Camera,
     })
