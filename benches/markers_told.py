@@ -8,6 +8,7 @@ windows of its markers.json, or with --auto with `--markers auto`; then `analyze
 One row a film:
   markers   followed, of those that there are       err px    median and 95 % of the distance from the true place
   seen      share of the frames without the board   lost      markers that are not seen in the last two seconds
+  other     share of the places that are more than a marker's width from the true one: they are on another thing
   board     px between the true place and the hidden marker's in the two seconds after the board, median
   first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
 """
@@ -29,11 +30,13 @@ def main():
     parser.add_argument("--out", type=Path, help="keeps the captures there")
     args = parser.parse_args()
     args.arborcam = args.arborcam.resolve()
-    print(f"{'film':<12}{'markers':>9}{'err px':>8}{'95 %':>7}{'worst':>7}{'seen':>7}{'lost':>6}{'board':>7}{'first Hz':>10}{'peak':>8}{'true':>8}")
+    print(f"{'film':<12}{'markers':>9}{'err px':>8}{'95 %':>7}{'worst':>7}{'other':>8}{'seen':>7}{'lost':>6}{'board':>7}{'first Hz':>10}{'peak':>8}{'true':>8}")
     with tempfile.TemporaryDirectory() as work:
         rows = [row(args, film, (args.out or Path(work)) / film.name) for film in args.films]
     errors = np.concatenate([r["errors"] for r in rows])
-    print(f"all films: median {np.median(errors):.2f} px, 95 % {np.quantile(errors, 0.95):.2f} px, lost {sum(r['lost'] for r in rows)}")
+    other = np.concatenate([r["other"] for r in rows])
+    print(f"all films: median {np.median(errors):.2f} px, 95 % {np.quantile(errors, 0.95):.2f} px, on another thing {100 * other.mean():.2f} %, "
+          f"seen {100 * np.mean([r['seen'] for r in rows]):.1f} %, lost {sum(r['lost'] for r in rows)} of {sum(r['markers'] for r in rows)}")
     for name in ("analysis", "peak"):
         off = np.array([r[name] - r["true_hz"] for r in rows])
         told = np.isfinite(off)
@@ -44,7 +47,9 @@ def main():
 def row(args, film, out):
     truth = json.loads((film / "truth_markers.json").read_text())
     spec = "auto" if args.auto else str(film / "markers.json")
-    subprocess.run([args.arborcam, "replay", film / "video.mkv", "--outline", film / "outline.json", "--markers", spec, "--fast",
+    video = film / "video.mkv"
+    source = [video] if video.exists() else [film, "--no-depth"]
+    subprocess.run([args.arborcam, "replay", *source, "--outline", film / "outline.json", "--markers", spec, "--fast",
                     "--headless", "--out", out], check=True, capture_output=True)
     seen = places(out)
     matched = match(truth["markers"], seen)
@@ -63,12 +68,13 @@ def row(args, film, out):
             after = (frames >= 30 * hidden["to_s"]) & (frames < 30 * (hidden["to_s"] + 2))
             board = np.median(off[after]) if after.any() else np.inf
     errors = np.concatenate(errors)
+    other = errors > 2 * truth["radius_px"]
     trunk = truth["markers"][0]
     analysis, peak = frequencies(args.arborcam, film, out, trunk["name"])
     true_hz = trunk["freq_hz"] * np.sqrt(1 - trunk["damping"] ** 2)
     print(f"{film.name:<12}{len(matched):>5}/{len(truth['markers']):<3}{np.median(errors):>8.2f}{np.quantile(errors, 0.95):>7.2f}"
-          f"{errors.max():>7.1f}{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
-    return dict(errors=errors, lost=lost, analysis=analysis, peak=peak, true_hz=true_hz)
+          f"{errors.max():>7.1f}{100 * other.mean():>7.1f}%{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
+    return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz=true_hz)
 
 
 def places(capture):

@@ -8,9 +8,7 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
-use crate::cloud::{
-    CloudMethod, CloudOptions, CloudTree, CloudTrees, Registration, trees_of_cloud,
-};
+use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud};
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::refuse_taken;
@@ -18,7 +16,7 @@ use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_c
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
-use crate::views::{DrawnTree, FilmOnScan, register_film, scan_defaults, sway_on_scan};
+use crate::views::{DrawnTree, FilmFit, FilmOnScan, register_film, scan_defaults, sway_on_scan};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point3, Vector3};
@@ -174,12 +172,21 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let branches = drawn.skeleton.measured_branches().count();
     match args.film_on(&tree, &scan, &drawn)? {
         Some(film) => {
-            let (swaying, miss) = (film.branches(), 100.0 * film.registration.miss);
+            let swaying = film.branches();
             drawn.write_with_film(&args.out, &film)?;
             eprint_line(&format!(
-                "the film lies on the scan to {miss:.1} % of its height; {swaying} of {branches} \
-                 branches carry its frequencies"
+                "{}; {swaying} of {branches} branches carry its frequencies",
+                lies_on(&film.fit)
             ));
+            if let Some(lean) = film.fit.lean.filter(|_| film.fit.is_rest_unsure()) {
+                eprint_line(&format!(
+                    "arborcam: warning: the tree leans in the film, or the camera was rolled, by {:.1} degrees; \
+                     places at rest may be off by {:.1} % of the height. Hang a tag upright beside \
+                     the trunk (--tag)",
+                    lean.angle.to_degrees(),
+                    100.0 * lean.rest_off_hi
+                ));
+            }
         }
         None => drop(drawn.write(&args.out)?),
     }
@@ -303,8 +310,8 @@ impl CloudArgs {
             pair.scan = scan.metres(&pair.scan) - foot;
         }
         let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
-        let registration = register_film(tree, &film, pairs).filter(Registration::holds);
-        let registration = registration.ok_or_else(|| {
+        let fit = register_film(tree, &film, pairs).filter(FilmFit::holds);
+        let fit = fit.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
                 None => "it is not found from where it was filmed; give three places in both with --pairs",
@@ -312,8 +319,22 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &registration);
-        Ok(Some(FilmOnScan { registration, sway }))
+        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &fit.registration);
+        Ok(Some(FilmOnScan { fit, sway }))
+    }
+}
+
+/// How well a film lies on a scan.
+fn lies_on(fit: &FilmFit) -> String {
+    match fit.off_hi {
+        Some(off) => format!(
+            "the film lies on the scan within {:.1} % of its height",
+            100.0 * off
+        ),
+        None => format!(
+            "the film lies on the scan to {:.1} % of its height",
+            100.0 * fit.registration.miss
+        ),
     }
 }
 

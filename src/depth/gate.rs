@@ -65,10 +65,18 @@ impl DepthGate {
         }
     }
 
-    fn is_of(&mut self, id: TrackId, depth: &DepthSeen) -> bool {
+    /// Whether a depth may be that of a point, by those that it has had.
+    pub fn may_be(&self, id: TrackId, depth: &DepthSeen) -> bool {
         let depth_m = f64::from(depth.depth_m);
+        self.points
+            .get(&id)
+            .is_none_or(|usual| !usual.is_far_from(depth_m))
+    }
+
+    fn is_of(&mut self, id: TrackId, depth: &DepthSeen) -> bool {
         let usual = self.points.entry(id).or_default();
         usual.last_frame = self.frame;
+        let depth_m = f64::from(depth.depth_m);
         if usual.is_far_from(depth_m) {
             return false;
         }

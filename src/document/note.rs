@@ -137,6 +137,19 @@ pub struct ScanFilmNote {
     pub turn_deg: f64,
     pub roll_deg: f64,
     pub px_per_metre: f64,
+    /// Where the foot of the scan lies against that of the film, px, to the right and up.
+    #[serde(default)]
+    pub shift_px: [f64; 2],
+    /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
+    /// square over the tree, as a share of its height; `null` where pairs were given.
+    #[serde(default)]
+    pub off_hi: Option<f64>,
+    /// Of a film in wind: how far the tree leans to the right against the scan, and `off_hi` for the
+    /// tree at rest. `roll_deg` is that of the leaning tree.
+    #[serde(default)]
+    pub lean_deg: Option<f64>,
+    #[serde(default)]
+    pub rest_off_hi: Option<f64>,
     /// What it misses lines or pairs of places by, as a share of the tree's height.
     pub miss: f64,
     /// The same from the best other side of the tree; `null` where pairs were given.

@@ -52,6 +52,19 @@ impl PixelArea {
         })
     }
 
+    /// What it has in common with another; without width or height where that is nothing.
+    pub fn common(&self, other: &Self) -> Self {
+        let (u, v) = (self.u.max(other.u), self.v.max(other.v));
+        let right = (self.u + self.width).min(other.u + other.width);
+        let bottom = (self.v + self.height).min(other.v + other.height);
+        Self {
+            u,
+            v,
+            width: (right - u).max(0),
+            height: (bottom - v).max(0),
+        }
+    }
+
     /// The same in an area whose corner is that of `outer`.
     pub fn relative_to(&self, outer: &Self) -> Self {
         Self {

@@ -3,35 +3,35 @@
 use super::area::PixelArea;
 use super::blobs;
 use super::error::{MarkerError, MarkerEvent};
-use super::hue::{Blob, Hsv, HueModel, Likelihood};
-use super::shift::shifted;
-use crate::config::{MAX_MARKERS, MarkerMethod, MarkerWindow, Markers};
+use super::hue::{Blob, Hsv, HueModel};
+use super::search::{candidates, settled};
+use super::way::Way;
+use crate::config::{MAX_MARKERS, MarkerWindow, Markers};
 use crate::model::{Outline, Rgb, TrackId};
 use nalgebra::{Point2, Vector2, distance, distance_squared};
 
-/// A marker is seen where so great a share of it is seen as usual; found again it must not be so many
-/// times larger: that is something else of its hue.
-const LEAST_SEEN: f64 = 0.5;
-const MAX_SEEN: f64 = 2.5;
+/// A marker is seen where so great a share of it is seen as usual.
+pub(super) const LEAST_SEEN: f64 = 0.5;
 /// How fast what is usual follows what is seen, a frame.
 const USUAL_SHARE: f64 = 0.05;
-/// Windows are enlarged by so many of their sizes to each side when a marker is missed in one frame,
-/// by one more after so many frames, and at most by this.
-const FIRST_RINGS: u32 = 2;
-const FRAMES_PER_RING: u32 = 3;
-const MAX_RINGS: u32 = 8;
-/// So much of the disc of another marker is not looked at, in its radii, and px beyond that.
-const OTHER_RADII: f64 = 1.5;
-const OTHER_MARGIN_PX: f64 = 1.0;
+/// Of two markers that are missing one is found where the other is expected so many times as far away.
+const CLEARLY_NEARER: f64 = 2.0;
 /// A marker that is missed for so long is hidden, s: twigs pass before markers all the time.
 const HIDDEN_S: f64 = 0.3;
-/// The sides to which windows are enlarged (Hu et al. sect. 5.1).
-const SIDES: [Vector2<f64>; 4] = [
-    Vector2::new(-1.0, 0.0),
-    Vector2::new(1.0, 0.0),
-    Vector2::new(0.0, -1.0),
-    Vector2::new(0.0, 1.0),
-];
+/// Says where a marker may be by what else is known of the scene, as its depth.
+pub trait Scene {
+    /// Whether this marker may be what is seen at a place of the picture, px.
+    fn may_be_at(&self, marker: TrackId, place_px: Point2<f64>) -> bool;
+}
+
+/// Nothing else is known.
+pub struct NoScene;
+
+impl Scene for NoScene {
+    fn may_be_at(&self, _: TrackId, _: Point2<f64>) -> bool {
+        true
+    }
+}
 
 /// Where a marker is seen in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,25 +48,28 @@ pub struct MarkerTracker {
     events: Vec<MarkerEvent>,
 }
 
-struct Marker {
+pub(super) struct Marker {
     given: MarkerWindow,
-    hue: HueModel,
+    pub hue: HueModel,
     /// The window in the first frame; its size is kept by mean shift.
-    first: PixelArea,
+    pub first: PixelArea,
     window: PixelArea,
     /// Where it was seen last, px, and when, s.
     at_px: Point2<f64>,
     seen_s: f64,
-    usual: Blob,
+    pub way: Way,
+    pub usual: Blob,
+    /// How compact it was in its first frame, 0 to 1.
+    pub compact: f64,
     frames_missed: u32,
     is_hidden: bool,
 }
 
 /// Where a window has come to stand, and what is in it.
 #[derive(Clone, Copy)]
-struct Sighting {
-    window: PixelArea,
-    blob: Blob,
+pub(super) struct Sighting {
+    pub window: PixelArea,
+    pub blob: Blob,
 }
 
 impl MarkerTracker {
@@ -98,8 +101,9 @@ impl MarkerTracker {
             markers: Vec::new(),
             events: Vec::new(),
         };
+        let areas: Vec<PixelArea> = windows.iter().map(area).collect();
         for window in windows {
-            tracker.add(&hsv, window, time_s)?;
+            tracker.add(&hsv, window, &areas, time_s)?;
         }
         for correction in &settings.corrections {
             if !hsv.size.contains(correction.at_px.into()) {
@@ -113,31 +117,31 @@ impl MarkerTracker {
         Ok(tracker)
     }
 
-    /// Takes one more marker, in the middle of its window in this frame.
-    fn add(&mut self, hsv: &Hsv, given: MarkerWindow, time_s: f64) -> Result<(), MarkerError> {
+    /// Takes one more marker, in the middle of its window in this frame; `areas` are the windows of all.
+    fn add(
+        &mut self,
+        hsv: &Hsv,
+        given: MarkerWindow,
+        areas: &[PixelArea],
+        time_s: f64,
+    ) -> Result<(), MarkerError> {
         let name = given.name.clone();
-        let [u, v, width, height] = given.window_px;
-        let window = PixelArea {
-            u: u.round() as i32,
-            v: v.round() as i32,
-            width: width.round() as i32,
-            height: height.round() as i32,
-        };
+        let window = area(&given);
         if !hsv.size.contains(window.middle_px()) {
             return Err(MarkerError::OffPicture {
                 name,
                 size: hsv.size,
             });
         }
-        let Some(hue) = HueModel::of(hsv, &window, &self.settings)? else {
+        let Some(hue) = HueModel::of(hsv, &window, areas, &self.settings)? else {
             return Err(MarkerError::Grey { name });
         };
         let around = grown(&window, 1.0);
         let likely = hue.likelihood(hsv, &around)?;
-        let sighting = match &likely {
-            Some(likely) => settled(likely, &window, &window, self.settings.method)?,
-            None => None,
+        let Some(likely) = likely else {
+            return Err(MarkerError::Grey { name });
         };
+        let sighting = settled(&likely, &window, &window, self.settings.method)?;
         let Some(Sighting { window: at, blob }) = sighting else {
             return Err(MarkerError::Grey { name });
         };
@@ -157,6 +161,8 @@ impl MarkerTracker {
             window: at,
             at_px: blob.at_px,
             seen_s: time_s,
+            way: Way::begin(blob.at_px, blob.radius_px(), time_s),
+            compact: likely.compact(&blob, &at, blob.radius_px()),
             usual: blob,
             frames_missed: 0,
             is_hidden: false,
@@ -177,8 +183,10 @@ impl MarkerTracker {
         if self.markers.len() >= MAX_MARKERS {
             return;
         }
+        let mut areas: Vec<PixelArea> = self.markers.iter().map(|m| m.window).collect();
+        areas.push(window);
         let hsv = Hsv::of(picture).map_err(MarkerError::from);
-        if let Err(why) = hsv.and_then(|hsv| self.add(&hsv, given, time_s)) {
+        if let Err(why) = hsv.and_then(|hsv| self.add(&hsv, given, &areas, time_s)) {
             self.events.push(MarkerEvent::NotTaken { why });
         }
     }
@@ -194,8 +202,14 @@ impl MarkerTracker {
     }
 
     /// Follows all markers into the next frame; those that are seen there, in the order of their ids.
-    pub fn step(&mut self, frame: u64, time_s: f64, picture: &Rgb) -> Vec<MarkerPlace> {
-        let sightings = match self.sightings(frame, picture) {
+    pub fn step(
+        &mut self,
+        frame: u64,
+        time_s: f64,
+        picture: &Rgb,
+        scene: &impl Scene,
+    ) -> Vec<MarkerPlace> {
+        let sightings = match self.sightings(frame, time_s, picture, scene) {
             Ok(sightings) => sightings,
             Err(e) => {
                 tracing::warn!("markers are not followed into frame {frame}: {e}");
@@ -230,25 +244,44 @@ impl MarkerTracker {
     }
 
     /// Where each marker is seen in the next frame.
-    fn sightings(&mut self, frame: u64, picture: &Rgb) -> opencv::Result<Vec<Option<Sighting>>> {
+    fn sightings(
+        &mut self,
+        frame: u64,
+        time_s: f64,
+        picture: &Rgb,
+        scene: &impl Scene,
+    ) -> opencv::Result<Vec<Option<Sighting>>> {
         let hsv = Hsv::of(picture)?;
-        self.correct(frame);
+        self.correct(frame, time_s);
         let mut sightings = Vec::with_capacity(self.markers.len());
-        for k in 0..self.markers.len() {
-            let followed = self.follow(&hsv, k)?;
+        for (k, marker) in self.markers.iter().enumerate() {
+            let followed = self.follow(&hsv, k)?.filter(|s| {
+                let place_px = s.blob.at_px;
+                marker.way.may_be_at(place_px, time_s)
+                    && scene.may_be_at(TrackId::of_marker(k), place_px)
+            });
             sightings.push(followed.or(self.corrected(frame, k)));
         }
         self.part(&mut sightings);
-        for k in 0..self.markers.len() {
-            if sightings[k].is_none() {
-                sightings[k] = self.search(&hsv, k, &sightings)?;
-            }
+        let seen: Vec<Blob> = sightings.iter().flatten().map(|s| s.blob).collect();
+        let missing: Vec<usize> = (0..self.markers.len())
+            .filter(|k| sightings[*k].is_none())
+            .collect();
+        for k in &missing {
+            let marker = &self.markers[*k];
+            let mut found = candidates(&hsv, marker, &seen, time_s, self.settings.method)?;
+            found.retain(|s| {
+                scene.may_be_at(TrackId::of_marker(*k), s.blob.at_px)
+                    && !self.may_be_another(*k, s.blob.at_px, &missing, time_s)
+            });
+            sightings[*k] = nearest(&found, &marker.way, time_s);
         }
+        self.part(&mut sightings);
         Ok(sightings)
     }
 
     /// Sets windows where the user says that the markers are in this frame.
-    fn correct(&mut self, frame: u64) {
+    fn correct(&mut self, frame: u64, time_s: f64) {
         for correction in self
             .settings
             .corrections
@@ -259,6 +292,7 @@ impl MarkerTracker {
             if let Some(marker) = self.markers.iter_mut().find(named) {
                 marker.at_px = correction.at_px.into();
                 marker.window = PixelArea::around(marker.at_px, marker.first.size_px());
+                marker.way.set(marker.at_px, time_s);
                 marker.frames_missed = 0;
             }
         }
@@ -301,6 +335,23 @@ impl MarkerTracker {
             .any(|(_, marker)| distance_squared(&marker.at_px, &place_px) < own)
     }
 
+    /// Whether what is seen at a place may as well be another marker that is missing: it is not clearly
+    /// nearer to where this one is expected. Both are missing on then, until one is at its own place.
+    fn may_be_another(
+        &self,
+        k: usize,
+        place_px: Point2<f64>,
+        missing: &[usize],
+        time_s: f64,
+    ) -> bool {
+        let own_px = self.markers[k].way.off_px(place_px, time_s);
+        missing.iter().any(|other| {
+            *other != k
+                && self.markers[*other].way.may_be_at(place_px, time_s)
+                && self.markers[*other].way.off_px(place_px, time_s) < CLEARLY_NEARER * own_px
+        })
+    }
+
     /// Of two markers on one blob the one that has come from farther away gives way.
     fn part(&self, sightings: &mut [Option<Sighting>]) {
         for j in 1..sightings.len() {
@@ -323,49 +374,6 @@ impl MarkerTracker {
             }
         }
     }
-
-    /// Looks for a marker in windows that are enlarged to four sides, the nearest ones first, beside
-    /// the markers that are seen (Hu et al. sect. 5.1).
-    fn search(
-        &self,
-        hsv: &Hsv,
-        k: usize,
-        sightings: &[Option<Sighting>],
-    ) -> opencv::Result<Option<Sighting>> {
-        let marker = &self.markers[k];
-        let rings = (FIRST_RINGS + marker.frames_missed / FRAMES_PER_RING).min(MAX_RINGS);
-        let around = PixelArea::around(marker.at_px, marker.first.size_px());
-        let Some(mut likely) = marker
-            .hue
-            .likelihood(hsv, &grown(&around, f64::from(rings)))?
-        else {
-            return Ok(None);
-        };
-        let seen: Vec<Blob> = sightings.iter().flatten().map(|s| s.blob).collect();
-        likely.without(|p| seen.iter().any(|other| covers(other, p)));
-        let size = marker.first.size_px();
-        for ring in 1..=rings {
-            let ring = f64::from(ring);
-            for side in SIDES {
-                let middle = marker.at_px + 0.5 * ring * side.component_mul(&size);
-                let large = PixelArea::around(middle, (1.0 + ring) * size);
-                let Some(reached) = shifted(&likely, &large, &large, MarkerMethod::MeanShift)?
-                else {
-                    continue;
-                };
-                let from = PixelArea::around(reached.middle_px(), size);
-                let sighting = settled(&likely, &from, &marker.first, self.settings.method)?;
-                let usual_px = marker.usual.mass_px;
-                let is_marker = |s: &Sighting| {
-                    (LEAST_SEEN * usual_px..=MAX_SEEN * usual_px).contains(&s.blob.mass_px)
-                };
-                if let Some(sighting) = sighting.filter(is_marker) {
-                    return Ok(Some(sighting));
-                }
-            }
-        }
-        Ok(None)
-    }
 }
 
 impl Marker {
@@ -374,6 +382,7 @@ impl Marker {
         let hidden_s = time_s - self.seen_s;
         self.window = sighting.window;
         self.at_px = sighting.blob.at_px;
+        self.way.see(self.at_px, time_s, self.frames_missed);
         self.seen_s = time_s;
         self.frames_missed = 0;
         self.usual.mass_px += USUAL_SHARE * (sighting.blob.mass_px - self.usual.mass_px);
@@ -401,17 +410,23 @@ impl Marker {
     }
 }
 
-/// Where `window` comes to stand, and the blob in it.
-fn settled(
-    likely: &Likelihood,
-    window: &PixelArea,
-    first: &PixelArea,
-    method: MarkerMethod,
-) -> opencv::Result<Option<Sighting>> {
-    let Some(window) = shifted(likely, window, first, method)? else {
-        return Ok(None);
-    };
-    Ok(likely.blob(&window).map(|blob| Sighting { window, blob }))
+/// The window that a user gave, in whole pixels.
+fn area(given: &MarkerWindow) -> PixelArea {
+    let [u, v, width, height] = given.window_px.map(|side| side.round() as i32);
+    PixelArea {
+        u,
+        v,
+        width,
+        height,
+    }
+}
+
+/// The sighting that is nearest to where a marker is expected.
+fn nearest(found: &[Sighting], way: &Way, time_s: f64) -> Option<Sighting> {
+    found.iter().copied().min_by(|a, b| {
+        let [a, b] = [a, b].map(|s| way.off_px(s.blob.at_px, time_s));
+        a.total_cmp(&b)
+    })
 }
 
 /// An area that is larger by so many of its own sizes on each side.
@@ -419,15 +434,11 @@ fn grown(area: &PixelArea, by: f64) -> PixelArea {
     PixelArea::around(area.middle_px(), (1.0 + 2.0 * by) * area.size_px())
 }
 
-/// Whether a place is on a marker.
-fn covers(marker: &Blob, place_px: Point2<f64>) -> bool {
-    distance(&marker.at_px, &place_px) < OTHER_RADII * marker.radius_px() + OTHER_MARGIN_PX
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::config::MarkerCorrection;
+    use crate::config::MarkerMethod;
     use crate::model::Size;
 
     const SIZE: Size = Size {
@@ -496,7 +507,7 @@ mod tests {
             };
             let mut tracker = begun(&at(0), &markers).expect("markers");
             for k in 1..60 {
-                let places = tracker.step(k, k as f64 / 30.0, &picture(&at(k), RED));
+                let places = tracker.step(k, k as f64 / 30.0, &picture(&at(k), RED), &NoScene);
                 assert_eq!(places.len(), 2, "{method:?}, frame {k}");
                 for (place, truth) in places.iter().zip(at(k)) {
                     assert!(
@@ -517,7 +528,12 @@ mod tests {
         )
         .expect("markers");
         for k in 1..31 {
-            let places = tracker.step(k, k as f64 / 30.0, &picture(&[[120.0, 90.0]], RED));
+            let places = tracker.step(
+                k,
+                k as f64 / 30.0,
+                &picture(&[[120.0, 90.0]], RED),
+                &NoScene,
+            );
             assert_eq!(places.len(), 1, "frame {k}");
         }
         // 31 px away, on the side of the other one.
@@ -525,6 +541,7 @@ mod tests {
             31,
             31.0 / 30.0,
             &picture(&[[62.0, 72.0], [120.0, 90.0]], RED),
+            &NoScene,
         );
         assert!(
             places.len() == 2 && off_px(&places[0], [62.0, 72.0]) < 0.3,
@@ -540,12 +557,81 @@ mod tests {
         );
     }
 
+    /// Two markers that sway by 10 px, 30 px apart.
+    fn swaying(k: u64) -> [[f64; 2]; 2] {
+        let sway = 10.0 * (k as f64 / 5.0).sin();
+        [[50.0 + sway, 60.0], [80.0 + sway, 62.0]]
+    }
+
+    fn followed_for(frames: u64) -> MarkerTracker {
+        let mut tracker = begun(&swaying(0), &settings(&swaying(0))).expect("markers");
+        for k in 1..frames {
+            let places = tracker.step(k, k as f64 / 30.0, &picture(&swaying(k), RED), &NoScene);
+            assert_eq!(places.len(), 2, "frame {k}");
+        }
+        tracker
+    }
+
+    #[test]
+    fn a_hidden_marker_is_not_taken_for_what_it_cannot_be() {
+        let mut tracker = followed_for(90);
+        // The left one is hidden; something of its hue is beyond where it sways.
+        for k in 90..150 {
+            let shown = [[15.0, 60.0], swaying(k)[1]];
+            let places = tracker.step(k, k as f64 / 30.0, &picture(&shown, RED), &NoScene);
+            assert_eq!(places.len(), 1, "frame {k}: {places:?}");
+        }
+        let shown = [[15.0, 60.0], swaying(150)[0], swaying(150)[1]];
+        let places = tracker.step(150, 5.0, &picture(&shown, RED), &NoScene);
+        assert!(
+            places.len() == 2 && off_px(&places[0], swaying(150)[0]) < 0.5,
+            "{places:?}"
+        );
+    }
+
+    #[test]
+    fn markers_that_were_hidden_together_come_back_as_themselves() {
+        let mut tracker = followed_for(90);
+        for k in 90..120 {
+            tracker.step(k, k as f64 / 30.0, &picture(&[], RED), &NoScene);
+        }
+        // One is seen before the other.
+        for k in 120..240 {
+            let both = swaying(k);
+            let shown = if k < 160 { &both[..1] } else { &both[..] };
+            let places = tracker.step(k, k as f64 / 30.0, &picture(shown, RED), &NoScene);
+            for place in &places {
+                let own = usize::from(place.id == TrackId::of_marker(1));
+                assert!(off_px(place, both[own]) < 0.5, "frame {k}: {place:?}");
+            }
+            assert!(k < 200 || places.len() == 2, "frame {k}: {places:?}");
+        }
+    }
+
+    /// Nothing right of this is as far away as the markers.
+    struct WallFrom(f64);
+
+    impl Scene for WallFrom {
+        fn may_be_at(&self, _: TrackId, place_px: Point2<f64>) -> bool {
+            place_px.x < self.0
+        }
+    }
+
+    #[test]
+    fn a_marker_is_not_at_a_depth_where_it_cannot_be() {
+        let disc = [[60.0, 60.0]];
+        let mut tracker = begun(&disc, &settings(&disc)).expect("marker");
+        let moved = picture(&[[63.0, 60.0]], RED);
+        assert!(tracker.step(1, 0.1, &moved, &WallFrom(61.0)).is_empty());
+        assert_eq!(tracker.step(2, 0.2, &moved, &WallFrom(70.0)).len(), 1);
+    }
+
     #[test]
     fn two_markers_never_share_a_blob() {
         let discs = [[60.0, 60.0], [75.0, 60.0]];
         let mut tracker = begun(&discs, &settings(&discs)).expect("markers");
         // The left one is gone: it must not take the right one, which is in its window.
-        let places = tracker.step(1, 0.1, &picture(&[[74.0, 60.0]], RED));
+        let places = tracker.step(1, 0.1, &picture(&[[74.0, 60.0]], RED), &NoScene);
         assert_eq!(places.len(), 1, "{places:?}");
         assert_eq!(places[0].id, TrackId::of_marker(1));
     }
@@ -561,10 +647,10 @@ mod tests {
         let mut tracker = begun(&[[30.0, 30.0]], &markers).expect("markers");
         let far = picture(&[[141.0, 101.5]], RED);
         assert!(
-            tracker.step(1, 0.1, &far).is_empty(),
+            tracker.step(1, 0.1, &far, &NoScene).is_empty(),
             "too far in one frame"
         );
-        let places = tracker.step(2, 0.2, &far);
+        let places = tracker.step(2, 0.2, &far, &NoScene);
         assert!(
             places.len() == 1 && off_px(&places[0], [141.0, 101.5]) < 0.3,
             "{places:?}"
@@ -572,7 +658,7 @@ mod tests {
         // Where nothing is seen the user's word stands.
         markers.corrections[0].frame = 1;
         let mut tracker = begun(&[[30.0, 30.0]], &markers).expect("markers");
-        let places = tracker.step(1, 0.1, &picture(&[], RED));
+        let places = tracker.step(1, 0.1, &picture(&[], RED), &NoScene);
         assert!(
             places.len() == 1 && off_px(&places[0], [140.0, 100.0]) < 1e-9,
             "{places:?}"
@@ -587,6 +673,7 @@ mod tests {
                 k,
                 k as f64 / 30.0,
                 &picture(&[[12.0 - 2.0 * k as f64, 50.0]], RED),
+                &NoScene,
             );
         }
         tracker.finish();
@@ -651,7 +738,7 @@ mod tests {
             Point2::new(51.0, 41.0),
             16.0,
         );
-        let places = tracker.step(1, 0.6, &picture(&[[52.0, 40.0]], RED));
+        let places = tracker.step(1, 0.6, &picture(&[[52.0, 40.0]], RED), &NoScene);
         assert!(
             places.len() == 1 && off_px(&places[0], [52.0, 40.0]) < 0.3,
             "{places:?}"

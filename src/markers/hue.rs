@@ -3,7 +3,7 @@
 use super::area::PixelArea;
 use crate::config::Markers;
 use crate::model::{Rgb, Size};
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 use opencv::core::{CV_8UC1, CV_32FC1, Mat, Scalar, Vector, in_range};
 use opencv::imgproc::{COLOR_RGB2HSV, calc_back_project, calc_hist, cvt_color_def};
 use opencv::prelude::*;
@@ -12,6 +12,11 @@ use opencv::prelude::*;
 pub const HUES: f32 = 180.0;
 /// A window in whose middle fewer pixels have a hue than this share shows no coloured marker.
 const LEAST_COLOURED: f64 = 0.15;
+/// So much of the area in which a marker is looked for is the marker: it is half as wide as its
+/// window, which is looked around by its size to each side.
+const MARKER_SHARE: f32 = 0.02;
+/// A hue that is nowhere else in the picture may be in this share of it in a later frame.
+const LEAST_ELSEWHERE: f32 = 1e-4;
 
 /// A picture as hue (half degrees), saturation and value, interleaved, row by row.
 pub struct Hsv {
@@ -57,7 +62,9 @@ impl Hsv {
     }
 }
 
-/// Which hues a marker has: the histogram of CamShift (Bradski 1998), 255 at the most frequent hue.
+/// Which hues a marker has and what is around it has not: the histogram of CamShift (Bradski 1998),
+/// weighted by how probable it is that a pixel of a hue is the marker (Bayes): what is found on leaves or
+/// bricks, too, counts for little. 255 at the hue that counts most.
 #[derive(Clone, Debug)]
 pub struct HueModel {
     bins: Vec<f32>,
@@ -67,11 +74,17 @@ pub struct HueModel {
 
 impl HueModel {
     /// Of the pixels in the ellipse of half the size of `window`, in its middle: what is at the rim of a
-    /// window is not the marker. `None` where nearly no pixel has a hue.
+    /// window is not the marker. What is in none of the windows of `markers` is the rest of the
+    /// picture. `None` where nearly no pixel has a hue.
     ///
     /// # Errors
     /// OpenCV fails.
-    pub fn of(hsv: &Hsv, window: &PixelArea, settings: &Markers) -> opencv::Result<Option<Self>> {
+    pub fn of(
+        hsv: &Hsv,
+        window: &PixelArea,
+        markers: &[PixelArea],
+        settings: &Markers,
+    ) -> opencv::Result<Option<Self>> {
         let middle = PixelArea::around(window.middle_px(), 0.5 * window.size_px());
         let Some(area) = middle.within(hsv.size) else {
             return Ok(None);
@@ -90,17 +103,9 @@ impl HueModel {
         if (n_coloured as f64) < LEAST_COLOURED * n_inside as f64 || n_coloured == 0 {
             return Ok(None);
         }
-        let mut histogram = Mat::default();
-        calc_hist(
-            &Vector::<Mat>::from_iter([pixels.try_clone()?]),
-            &Vector::from_slice(&[0]),
-            &coloured,
-            &mut histogram,
-            &Vector::from_slice(&[settings.hue_bins as i32]),
-            &Vector::from_slice(&[0.0, HUES]),
-            false,
-        )?;
-        let mut bins = histogram.data_typed::<f32>()?.to_vec();
+        let own = hue_shares(&pixels, &coloured, settings, n_inside)?;
+        let elsewhere = hues_elsewhere(hsv, markers, settings)?;
+        let mut bins: Vec<f32> = own.iter().zip(&elsewhere).map(by_hue).collect();
         let most = bins.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         bins.iter_mut().for_each(|bin| *bin *= 255.0 / most);
         Ok(Some(Self {
@@ -142,6 +147,54 @@ impl HueModel {
         debug_assert_eq!(histogram.typ(), CV_32FC1);
         Ok(Some(Likelihood { area, pixels }))
     }
+}
+
+/// What a hue counts, which the marker has in the first share of its pixels and the rest of the picture
+/// in the second: by its frequency (Bradski 1998), times how probable it is that a pixel of it is the
+/// marker (Bayes). What the marker has little of counts for little, however rare it is elsewhere.
+fn by_hue((own, elsewhere): (&f32, &f32)) -> f32 {
+    let marker = MARKER_SHARE * own;
+    let rest = (1.0 - MARKER_SHARE) * elsewhere.max(LEAST_ELSEWHERE);
+    own * marker / (marker + rest)
+}
+
+/// Of the pixels outside of these areas the share of each bin of hues; the rest has no hue.
+fn hues_elsewhere(hsv: &Hsv, areas: &[PixelArea], settings: &Markers) -> opencv::Result<Vec<f32>> {
+    let (rows, cols) = (hsv.size.height as i32, 3 * hsv.size.width as i32);
+    let flat = Mat::new_rows_cols_with_data(rows, cols, hsv.pixels())?;
+    let pixels = flat.reshape(3, rows)?;
+    let mut coloured = colour_mask(&pixels, settings.least_saturation, settings.least_value)?;
+    let mut n_pixels = hsv.size.area();
+    for area in areas.iter().filter_map(|area| area.within(hsv.size)) {
+        for v in area.v..area.v + area.height {
+            for u in area.u..area.u + area.width {
+                *coloured.at_2d_mut::<u8>(v, u)? = 0;
+            }
+        }
+        n_pixels = n_pixels.saturating_sub((area.width * area.height) as usize);
+    }
+    hue_shares(&pixels, &coloured, settings, n_pixels)
+}
+
+/// How many of the pixels under a mask are in each bin of hues, as a share of so many.
+fn hue_shares(
+    pixels: &impl MatTraitConst,
+    mask: &Mat,
+    settings: &Markers,
+    of: usize,
+) -> opencv::Result<Vec<f32>> {
+    let mut histogram = Mat::default();
+    calc_hist(
+        &Vector::<Mat>::from_iter([pixels.try_clone()?]),
+        &Vector::from_slice(&[0]),
+        mask,
+        &mut histogram,
+        &Vector::from_slice(&[settings.hue_bins as i32]),
+        &Vector::from_slice(&[0.0, HUES]),
+        false,
+    )?;
+    let counts = histogram.data_typed::<f32>()?;
+    Ok(counts.iter().map(|n| n / of.max(1) as f32).collect())
 }
 
 /// 255 where a pixel has a hue, else 0.
@@ -199,6 +252,15 @@ impl Likelihood {
         }
     }
 
+    /// How much of what is likely in a window is in the square that holds a marker of this radius, px,
+    /// 0 to 1: little where what is likely is strewn over the window.
+    pub fn compact(&self, blob: &Blob, window: &PixelArea, radius_px: f64) -> f64 {
+        let side = 2.0 * (HALF_SQUARE_RADII * radius_px + HALF_SQUARE_MARGIN_PX);
+        let around = PixelArea::around(blob.at_px, Vector2::repeat(side));
+        let inside = self.blob(&around.common(window));
+        inside.map_or(0.0, |b| b.mass_px / blob.mass_px)
+    }
+
     /// The sum of what is likely in a window, in whole pixels, and its weighted middle, px; `None`
     /// where nothing is likely there.
     pub fn blob(&self, window: &PixelArea) -> Option<Blob> {
@@ -221,6 +283,10 @@ impl Likelihood {
     }
 }
 
+/// Half the side of the square that holds a marker, in its radii, and px beyond that: the picture blurs.
+const HALF_SQUARE_RADII: f64 = 1.2;
+const HALF_SQUARE_MARGIN_PX: f64 = 1.0;
+
 /// What is likely in a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blob {
@@ -234,5 +300,19 @@ impl Blob {
     /// The radius of a disc of this size, px.
     pub fn radius_px(&self) -> f64 {
         (self.mass_px / std::f64::consts::PI).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hue_counts_by_its_frequency_and_by_what_else_has_it() {
+        let alone = by_hue((&0.9, &0.0));
+        // A rim of another hue, which is rare in the picture.
+        assert!(by_hue((&0.1, &0.0)) < 0.2 * alone);
+        // A wall of the marker's hue.
+        assert!(by_hue((&0.9, &0.2)) < 0.1 * alone);
     }
 }

@@ -11,7 +11,9 @@ mod blobs;
 mod error;
 mod follow;
 mod hue;
+mod search;
 mod shift;
+mod way;
 
 pub use error::{MarkerError, MarkerEvent};
-pub use follow::{MarkerPlace, MarkerTracker};
+pub use follow::{MarkerPlace, MarkerTracker, NoScene, Scene};

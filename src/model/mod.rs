@@ -78,7 +78,7 @@ pub use snapshot::{
 pub use sway::{Excitation, Interval, Sway, Swaying, Unidentified};
 pub use sway_columns::SwayColumns;
 pub use sway_now::{AngleSpectrum, Angles, BranchSway, SwayNow};
-pub use tag_scale::TagScale;
+pub use tag_scale::{TagScale, TagState};
 pub use timing::{DepthCounts, Gap, GapCause, MAX_GAPS, Timing};
 pub use track::{LONGEST_TRIAL_S, Observation, TrackId, TrackSet};
 pub use track_log::{LogWindow, Tentative, TrackLog};

@@ -2,8 +2,8 @@
 //! changed.
 
 use super::{
-    Angles, Background, DepthCounts, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, Verdict,
-    Wood, WoodSight,
+    Angles, Background, DepthCounts, NodeName, Pose, Rgb, Shake, Size, Skeleton, SwayNow, TagState,
+    Verdict, Wood, WoodSight,
 };
 use nalgebra::Point2;
 use std::sync::Arc;
@@ -73,6 +73,8 @@ pub struct CameraState {
     pub rate_off: bool,
     /// Of the depth camera beside it; `None` where there is none.
     pub depth: Option<DepthCameraState>,
+    /// The tag beside the trunk, once it has given the scale.
+    pub tag: Option<TagState>,
 }
 
 /// How a depth camera beside the camera does. The counts only ever grow.

@@ -17,6 +17,9 @@ pub struct TagScale {
     pub metres_per_px_hi: f64,
     /// Angle from the upright of the picture to that of the tag, clockwise, degrees.
     pub roll_deg: f64,
+    /// The standard deviation of that by the edges of the tag. How upright it hangs is not in it.
+    #[serde(default)]
+    pub roll_sd_deg: f64,
     /// Its short over its long side as it is seen aslant: 1 from the front.
     pub foreshortened: f64,
     /// How far its middle moves, px: root mean square about its mean place. It hangs still, so that this is
@@ -29,4 +32,12 @@ impl TagScale {
     pub fn relative_error(&self) -> f64 {
         0.5 * (self.metres_per_px_hi - self.metres_per_px_lo) / self.metres_per_px
     }
+}
+
+/// A tag as it is seen in a live capture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TagState {
+    pub scale: TagScale,
+    /// Whether it was seen when it was last looked for.
+    pub is_seen: bool,
 }

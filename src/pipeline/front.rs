@@ -1,7 +1,7 @@
 //! The front end: frame to tracks.
 
 use super::back::Followed;
-use super::marked::MarkerStage;
+use super::marked::{MarkerDepths, MarkerStage};
 use super::tagged::{TagNews, TagStage};
 use crate::config::{Config, MarkerWindow};
 use crate::depth::{DepthGate, DepthReader};
@@ -75,7 +75,15 @@ impl FrontEnd {
             }
         }
         self.tag.step(&frame);
-        let markers = self.markers.step(&mut frame, self.given.as_deref());
+        let depth = frame.depth.clone();
+        let depths = MarkerDepths {
+            gate: &self.depth_gate,
+            reader: self.depth.as_ref(),
+            image: depth.as_deref(),
+            picture: frame.luma.size,
+        };
+        let region = self.given.as_deref();
+        let markers = self.markers.step(&mut frame, region, &depths);
         self.held.push_back(Held { frame, markers });
         if self.found.is_none() {
             while self.held.iter().map(Held::bytes).sum::<usize>() > HELD_BYTES {

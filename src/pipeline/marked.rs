@@ -1,12 +1,31 @@
 //! Coloured markers beside the points: frame to tracks of markers.
 
 use crate::config::{MarkerWindow, Markers};
-use crate::markers::{MarkerError, MarkerEvent, MarkerPlace, MarkerTracker};
-use crate::model::{Background, Frame, Observation, Outline, TrackSet};
+use crate::depth::{DepthGate, DepthReader};
+use crate::markers::{MarkerError, MarkerEvent, MarkerPlace, MarkerTracker, Scene};
+use crate::model::{Background, DepthImage, Frame, Observation, Outline, Size, TrackId, TrackSet};
 use nalgebra::Point2;
 
 /// Side of the window around a marker that is picked, px at 640 px.
 const PICKED_SIDE_PX: f64 = 16.0;
+
+/// What is known of the depths of markers before a frame, and the depth in it.
+pub(super) struct MarkerDepths<'a> {
+    pub gate: &'a DepthGate,
+    pub reader: Option<&'a DepthReader>,
+    pub image: Option<&'a DepthImage>,
+    pub picture: Size,
+}
+
+impl Scene for MarkerDepths<'_> {
+    fn may_be_at(&self, marker: TrackId, place_px: Point2<f64>) -> bool {
+        let (Some(reader), Some(image)) = (self.reader, self.image) else {
+            return true;
+        };
+        let depth = reader.at(image, self.picture, place_px);
+        depth.is_none_or(|depth| self.gate.may_be(marker, &depth))
+    }
+}
 
 /// Follows markers, where there are any, from the first frame in colour on.
 pub(super) struct MarkerStage {
@@ -31,8 +50,13 @@ impl MarkerStage {
     }
 
     /// Follows the markers into a frame, whose colours are not needed any more then. Markers that are
-    /// looked for lie in `region`, if there is one.
-    pub fn step(&mut self, frame: &mut Frame, region: Option<&Outline>) -> Vec<MarkerPlace> {
+    /// looked for lie in `region`, if there is one; none is at a depth that `depths` does not allow.
+    pub fn step(
+        &mut self,
+        frame: &mut Frame,
+        region: Option<&Outline>,
+        depths: &MarkerDepths,
+    ) -> Vec<MarkerPlace> {
         let Some(picture) = frame.colour.take() else {
             return Vec::new();
         };
@@ -52,7 +76,7 @@ impl MarkerStage {
             tracker.pick(&picture, frame.time_s, at_px, side_px);
             self.are_new = true;
         }
-        tracker.step(frame.index, frame.time_s, &picture)
+        tracker.step(frame.index, frame.time_s, &picture, depths)
     }
 
     /// Adds the markers of a frame to its tracks, without the camera's motion.

@@ -21,6 +21,8 @@ pub enum TagNews {
     Scale(TagScale),
     /// The same with later sights, of which the scale does not take notice.
     Seen(TagScale),
+    /// It was looked for later and not seen.
+    Unseen(TagScale),
     /// There is none in the first frames.
     NoneSeen,
 }
@@ -61,7 +63,15 @@ impl TagStage {
             let known = self.sights.first().map(|seen| seen.tag.id);
             let tags = find_tags(&frame.luma);
             let tag = tags.iter().find(|tag| known.is_none_or(|id| id == tag.id));
-            self.sights.extend(tag.and_then(TagSeen::of));
+            let seen = tag.and_then(TagSeen::of);
+            self.sights.extend(seen);
+            if let Some(fixed) = self.scale {
+                let known = self.with_all_sights(fixed);
+                self.news.push(match seen {
+                    Some(_) => TagNews::Seen(known),
+                    None => TagNews::Unseen(known),
+                });
+            }
         }
         if self.scale.is_none() && self.sights.len() >= SIGHTS {
             self.fix();
@@ -76,15 +86,21 @@ impl TagStage {
         match self.scale {
             None => self.fix(),
             Some(fixed) => {
-                let all = scale_of(&self.sights, self.settings.size_m);
-                self.news.extend(all.map(|all| {
-                    TagNews::Seen(TagScale {
-                        frames: all.frames,
-                        moves_px: all.moves_px,
-                        ..fixed
-                    })
-                }));
+                let known = self.with_all_sights(fixed);
+                self.news.push(TagNews::Seen(known));
             }
+        }
+    }
+
+    /// The scale as it was fixed, with what later sights say of how often it was seen and of the camera.
+    fn with_all_sights(&self, fixed: TagScale) -> TagScale {
+        match scale_of(&self.sights, self.settings.size_m) {
+            Some(all) => TagScale {
+                frames: all.frames,
+                moves_px: all.moves_px,
+                ..fixed
+            },
+            None => fixed,
         }
     }
 

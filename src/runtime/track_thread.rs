@@ -5,7 +5,7 @@ use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use crate::config::MarkerWindow;
-use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TimedFrame};
+use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame};
 use crate::outline::{self, Scribbles};
 use crate::pipeline::{DecodeStage, Followed, FrontEnd, TagNews, Undecoded};
 use crate::source::DecodeError;
@@ -269,15 +269,25 @@ impl<'a> TrackThread<'a> {
             match news {
                 TagNews::Scale(scale) => {
                     self.shared.tell(tag_line(&scale));
+                    self.show_tag(scale, true);
                     self.pass_on(ToModel::Tag(scale));
                 }
-                TagNews::Seen(scale) => drop(self.pass_on(ToModel::Tag(scale))),
+                TagNews::Seen(scale) => {
+                    self.show_tag(scale, true);
+                    self.pass_on(ToModel::Tag(scale));
+                }
+                TagNews::Unseen(scale) => self.show_tag(scale, false),
                 TagNews::NoneSeen => self.shared.warn(NO_TAG.into()),
             }
         }
         if let Some(markers) = self.front.take_new_markers() {
             self.pass_on(ToModel::Markers(markers));
         }
+    }
+
+    fn show_tag(&self, scale: TagScale, is_seen: bool) {
+        self.shared
+            .camera(|camera| camera.tag = Some(TagState { scale, is_seen }));
     }
 
     fn report(&mut self) {

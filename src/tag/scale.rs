@@ -25,6 +25,8 @@ pub struct TagSeen {
     bias_px: f64,
     /// Angle from the upright of the picture to that of the tag, clockwise, degrees.
     roll_deg: f64,
+    /// How far it turns, degrees, where each corner moves by a pixel of its own.
+    roll_per_px: f64,
     /// How much shorter the tag is along the direction in which it is seen aslant, 0 to 1.
     foreshortened: f64,
 }
@@ -33,7 +35,7 @@ impl TagSeen {
     /// What one sight says; `None` where the corners are no square seen from the front.
     pub fn of(tag: &Tag) -> Option<Self> {
         let shape = Shape::of(&tag.corners_px)?;
-        let (mut squares, mut bias) = (0.0, 0.0);
+        let (mut squares, mut bias, mut turns) = (0.0, 0.0, 0.0);
         let middle = Point2::from(
             tag.corners_px
                 .iter()
@@ -46,7 +48,9 @@ impl TagSeen {
             for axis in 0..2 {
                 let mut moved = tag.corners_px;
                 moved[k][axis] += NUDGE_PX;
-                gradient[axis] = (Shape::of(&moved)?.side_px - shape.side_px) / NUDGE_PX;
+                let nudged = Shape::of(&moved)?;
+                gradient[axis] = (nudged.side_px - shape.side_px) / NUDGE_PX;
+                turns += ((nudged.roll_deg - shape.roll_deg) / NUDGE_PX).powi(2);
             }
             squares += gradient.norm_squared();
             // Both edges of a corner move outwards.
@@ -60,6 +64,7 @@ impl TagSeen {
             scatter_px: tag.corner_sd_px * squares.sqrt(),
             bias_px: EDGE_BIAS_PX * bias.abs(),
             roll_deg: shape.roll_deg,
+            roll_per_px: turns.sqrt(),
             foreshortened: shape.foreshortened,
         })
     }
@@ -120,9 +125,20 @@ pub fn scale_of(seen: &[TagSeen], size_m: f64) -> Option<TagScale> {
         metres_per_px_lo: at(Interval::Z * sd_px),
         metres_per_px_hi: at(-Interval::Z * sd_px),
         roll_deg: middle(|s| s.roll_deg)?,
+        roll_sd_deg: roll_sd_deg(seen)?,
         foreshortened: middle(|s| s.foreshortened)?,
         moves_px: (squares / seen.len() as f64).sqrt(),
     })
+}
+
+/// How surely the upright of the tag is known by its edges, degrees: as of the scale, noise is another one
+/// in each frame, and a bias of a corner is not.
+fn roll_sd_deg(seen: &[TagSeen]) -> Option<f64> {
+    let noise = seen.iter().map(|s| s.roll_per_px * s.tag.corner_sd_px);
+    let noise = median(noise.collect(), f64::total_cmp)?;
+    let bias = seen.iter().map(|s| s.roll_per_px * EDGE_BIAS_PX);
+    let bias = median(bias.collect(), f64::total_cmp)?;
+    Some((noise * noise / seen.len() as f64).sqrt().hypot(bias))
 }
 
 #[cfg(test)]
@@ -263,7 +279,9 @@ mod tests {
         let tags = find_tags(&picture(&view, 3, 5));
         let seen = TagSeen::of(&tags[0]).expect("a square");
         let scale = scale_of(&[seen; 4], 0.2).expect("a scale");
-        assert!((scale.roll_deg - 7.0).abs() < 0.3, "{}", scale.roll_deg);
+        let off_deg = (scale.roll_deg - 7.0).abs();
+        assert!(off_deg < 2.0 * scale.roll_sd_deg, "{scale:?}");
+        assert!(scale.roll_sd_deg < 0.3, "{scale:?}");
         assert!((scale.frames, scale.moves_px) == (4, 0.0));
     }
 

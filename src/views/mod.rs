@@ -4,6 +4,7 @@
 
 mod drawn;
 mod error;
+mod film_fit;
 mod forest;
 mod forest_plan;
 mod forest_studio;
@@ -23,6 +24,7 @@ mod write;
 
 pub use drawn::DrawnTree;
 pub use error::PrepareError;
+pub use film_fit::FilmFit;
 pub use forest::PreparedForest;
 pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use forest_studio::ForestStudio;

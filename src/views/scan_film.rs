@@ -1,8 +1,9 @@
 //! The film of a tree laid on its scan: the sway that was filmed, on the wood that was scanned.
 
+use super::film_fit::{FilmFit, FilmPiece, Upright};
 use crate::cloud::{CloudTree, PlacePair, Registration, WoodPiece, by_lines, by_pairs};
 use crate::document::Document;
-use crate::model::{NodeId, Skeleton, Swaying, Unidentified};
+use crate::model::{Excitation, NodeId, Skeleton, Swaying, Unidentified};
 use nalgebra::{Point2, Point3, Vector2};
 use std::collections::BTreeMap;
 
@@ -14,16 +15,19 @@ const ACROSS_SHARE: f64 = 0.05;
 const SAMPLES: usize = 12;
 
 /// How a film lies on a scan; `None` where there is nothing to compare. It is to be asked whether
-/// it [`holds`](Registration::holds). `pairs` are places that a user has found in both: in the film
+/// it [`holds`](FilmFit::holds). `pairs` are places that a user has found in both: in the film
 /// with v down, in the scan against the foot of `tree`.
 pub fn register_film(
     tree: &CloudTree,
     film: &Document,
     pairs: Option<&[PlacePair]>,
-) -> Option<Registration> {
-    let wood = film_wood(&film.skeleton);
+) -> Option<FilmFit> {
+    let pieces = film_wood(&film.skeleton);
+    let wood: Vec<WoodPiece<Point2<f64>>> = pieces.iter().map(|p| p.wood).collect();
     let Some(pairs) = pairs else {
-        return by_lines(&wood, &scan_wood(tree));
+        let scan = scan_wood(tree);
+        let found = by_lines(&wood, &scan)?;
+        return FilmFit::by_lines(found, &pieces, &scan, upright_in_wind(film));
     };
     let height_px = wood.iter().map(|p| p.to.y).fold(0.0, f64::max);
     let foot_px = film.skeleton.foot_px;
@@ -31,19 +35,37 @@ pub fn register_film(
         film_px: Point2::new(p.film_px.x - foot_px.x, foot_px.y - p.film_px.y),
         scan: p.scan,
     };
-    by_pairs(&pairs.iter().map(upright).collect::<Vec<_>>(), height_px)
+    let pairs: Vec<PlacePair> = pairs.iter().map(upright).collect();
+    by_pairs(&pairs, height_px).map(FilmFit::by_pairs)
+}
+
+/// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree
+/// comes to rest upright.
+fn upright_in_wind(film: &Document) -> Option<Upright> {
+    let swaying = film.sway.iter().flatten();
+    let is_wind = swaying.map(|s| s.excitation).any(|e| e == Excitation::Wind);
+    is_wind.then(|| match &film.note.tag {
+        Some(tag) => Upright::Tag {
+            roll_deg: tag.roll_deg,
+            sd_deg: tag.roll_sd_deg,
+        },
+        None => Upright::Camera,
+    })
 }
 
 /// The wood that was filmed, in the picture's plane, the foot at the origin; copies were not.
-fn film_wood(skeleton: &Skeleton) -> Vec<WoodPiece<Point2<f64>>> {
+fn film_wood(skeleton: &Skeleton) -> Vec<FilmPiece> {
+    let names = skeleton.botanical_branches();
     let mut pieces = Vec::new();
-    for node in &skeleton.nodes[..skeleton.measured()] {
+    for (k, node) in skeleton.nodes[..skeleton.measured()].iter().enumerate() {
         if let Some(parent) = node.parent {
-            pieces.push(WoodPiece {
+            let wood = WoodPiece {
                 from: skeleton.nodes[parent.index()].position.xy(),
                 to: node.position.xy(),
                 radius: node.radius,
-            });
+            };
+            let branch = names.of(NodeId(k as u32));
+            pieces.push(FilmPiece { wood, branch });
         }
     }
     pieces
@@ -85,7 +107,7 @@ pub fn sway_on_scan(
     };
     let height_px = film_wood(&film.skeleton)
         .iter()
-        .map(|p| p.to.y)
+        .map(|p| p.wood.to.y)
         .fold(0.0, f64::max);
     let filmed: Vec<NodeId> = film.skeleton.measured_branches().collect();
     let film_lines: Vec<Vec<Sample>> = filmed

@@ -2,7 +2,8 @@
 
 use super::PrepareError;
 use super::drawn::{DrawnTree, note};
-use crate::cloud::{CloudTree, Registration};
+use super::film_fit::FilmFit;
+use crate::cloud::CloudTree;
 use crate::config::{Config, LeafShow};
 use crate::document::note::{ScanFilmNote, ScanNote};
 use crate::model::{Outline, PointCloud, Swaying};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// A film that was laid on a scan.
 #[derive(Clone, Debug)]
 pub struct FilmOnScan {
-    pub registration: Registration,
+    pub fit: FilmFit,
     /// By node index of the scanned tree.
     pub sway: Vec<Swaying>,
 }
@@ -25,7 +26,8 @@ impl FilmOnScan {
     }
 
     fn note(&self) -> ScanFilmNote {
-        let registration = &self.registration;
+        let registration = &self.fit.registration;
+        let shift_px = registration.to_picture.isometry.translation.vector;
         ScanFilmNote {
             turn_deg: registration.turn.to_degrees(),
             roll_deg: registration
@@ -35,6 +37,10 @@ impl FilmOnScan {
                 .angle()
                 .to_degrees(),
             px_per_metre: registration.to_picture.scaling(),
+            shift_px: shift_px.into(),
+            off_hi: self.fit.off_hi,
+            lean_deg: self.fit.lean.map(|lean| lean.angle.to_degrees()),
+            rest_off_hi: self.fit.lean.map(|lean| lean.rest_off_hi),
             miss: registration.miss,
             other_side_miss: registration.other_side_miss,
             branches: self.branches() as u64,

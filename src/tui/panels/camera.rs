@@ -1,7 +1,7 @@
 //! What was asked of the camera, what it gives, and what is lost on the way.
 
 use super::titled;
-use crate::model::{Background, DepthCameraState, Snapshot};
+use crate::model::{Background, DepthCameraState, Snapshot, TagState};
 use crate::tui::format::{count, millis, value};
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
@@ -23,18 +23,26 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         Span::styled(format!("p50 {}", millis(s.latency_p50_ms)), theme.strong()),
         Span::raw(format!("  p99 {}", millis(s.latency_p99_ms))),
     ];
-    // With a depth camera there is no line to spare for what was asked for.
-    let first = match &s.camera.depth {
-        Some(depth) => row("depth", of_depth(depth, theme), theme),
-        None => row("asked", vec![or_dash(&s.format.asked)], theme),
-    };
-    let mut lines = vec![
-        first,
-        row("given", vec![given(s, theme)], theme),
+    // With a depth camera there is no line to spare for what was asked for, and with a tag besides none
+    // for what is given.
+    let mut lines = Vec::new();
+    if let Some(depth) = &s.camera.depth {
+        lines.push(row("depth", of_depth(depth, theme), theme));
+    }
+    if let Some(tag) = &s.camera.tag {
+        lines.push(row("tag", vec![of_tag(tag, theme)], theme));
+    }
+    if lines.is_empty() {
+        lines.push(row("asked", vec![or_dash(&s.format.asked)], theme));
+    }
+    if lines.len() < 2 {
+        lines.push(row("given", vec![given(s, theme)], theme));
+    }
+    lines.extend([
         row("rate", rate(s, theme), theme),
         row("delay", delay, theme),
         row("shake", shake(s, theme), theme),
-    ];
+    ]);
     let counts = [
         s.lost_in_camera,
         s.dropped_before_tracker,
@@ -90,6 +98,21 @@ fn of_depth(depth: &DepthCameraState, theme: Theme) -> Vec<Span<'static>> {
         loss("lost", lost, theme),
         loss("frames without", counts.frames_without, theme),
     )
+}
+
+/// How long a pixel is by the tag, with half of the 95 % interval, or that the tag is not seen now.
+fn of_tag(tag: &TagState, theme: Theme) -> Span<'static> {
+    let scale = &tag.scale;
+    let length = format!(
+        "{:.5} m/px ±{:.1} %",
+        scale.metres_per_px,
+        100.0 * scale.relative_error()
+    );
+    if tag.is_seen {
+        Span::styled(length, theme.strong())
+    } else {
+        Span::styled(format!("not seen  {length}"), theme.warning())
+    }
 }
 
 /// The camera's rate and that at which frames are worked off, or why there is none.
