@@ -44,13 +44,14 @@ pub fn register_film(
 fn upright_in_wind(film: &Document) -> Option<Upright> {
     let swaying = film.sway.iter().flatten();
     let is_wind = swaying.map(|s| s.excitation).any(|e| e == Excitation::Wind);
-    is_wind.then(|| match &film.note.tag {
+    let upright = match &film.note.tag {
         Some(tag) => Upright::Tag {
             roll_deg: tag.roll_deg,
             sd_deg: tag.roll_sd_deg,
         },
         None => Upright::Camera,
-    })
+    };
+    is_wind.then_some(upright)
 }
 
 /// The wood that was filmed, in the picture's plane, the foot at the origin; copies were not.
