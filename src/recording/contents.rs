@@ -105,7 +105,7 @@ impl Contents {
             .collect()
     }
 
-    /// A number that the recording tells of itself.
+    /// A number that the recording says of itself.
     pub fn number<T: std::str::FromStr>(&self, key: &str) -> Option<T> {
         self.about.get(key)?.parse().ok()
     }

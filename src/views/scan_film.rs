@@ -8,7 +8,7 @@ use nalgebra::{Point2, Point3, Vector2};
 use std::collections::BTreeMap;
 
 /// A scanned branch is a filmed one if it lies no farther from its line than this share of the
-/// tree's height; a right angle between them counts as so far.
+/// tree's height, and is as thick to that; a right angle between them counts as so far.
 const FARTHEST_SHARE: f64 = 0.025;
 const ACROSS_SHARE: f64 = 0.05;
 /// Samples of a branch.
@@ -121,16 +121,18 @@ pub fn sway_on_scan(
     let mut found: Vec<BTreeMap<String, Pieces>> = vec![BTreeMap::new(); filmed.len()];
     for piece in scan.measured_branches() {
         let own = line(scan, piece, project);
-        let offs = film_lines
-            .iter()
-            .map(|line| mean_off(&own, line, ACROSS_SHARE * height_px));
+        let radius = scan.nodes[piece.index()].radius;
+        let radius_px = radius * metres_per_px * registration.to_picture.scaling();
+        let offs = filmed.iter().zip(&film_lines).map(|(branch, line)| {
+            let thicker_px = film.skeleton.nodes[branch.index()].radius - radius_px;
+            mean_off(&own, line, ACROSS_SHARE * height_px).hypot(thicker_px)
+        });
         let nearest = offs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
         let Some((branch, _)) = nearest.filter(|(_, off)| *off <= FARTHEST_SHARE * height_px)
         else {
             continue;
         };
         let pieces = found[branch].entry(names.name(piece)).or_default();
-        let radius = scan.nodes[piece.index()].radius;
         pieces.wood += length(&own) * radius * radius;
         pieces.nodes.push(piece);
     }
