@@ -166,7 +166,7 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
     let animator = Animator::new(tree.skeleton.clone(), &measured, settings, wind);
     if animator.tuning().all(|t| !t.measured) {
         eprint_line(&format!(
-            "arborcam: warning: the capture has no frequency of any branch; they are taken from \
+            "arborcam: warning: the tree has no frequency of any branch; they are taken from \
              thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
             settings.trunk_hz
         ));
