@@ -338,7 +338,7 @@ hu() {
     scanned_beside $seed $other
 }
 
-# pulled NAME SEED OPTIONS...: a made film of ten markers on a tree that is pulled and let go, and its capture.
+# pulled NAME SEED OPTIONS...: a made film of ten markers on a tree that is pulled and released, and its capture.
 pulled() {
     local name=$1 seed=$2 film=$work/pulled-$1
     shift 2

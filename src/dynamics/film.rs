@@ -147,13 +147,13 @@ impl Film {
 
     /// Each `every` neighbouring frames as one: the means of their times, and of the places of each
     /// point in those that show it. Frames between which some are missing are not put together.
-    pub(super) fn in_means_of(&self, every: usize) -> Cow<'_, Self> {
+    pub(super) fn in_means_of(film: Cow<'_, Self>, every: usize) -> Cow<'_, Self> {
         if every < 2 {
-            return Cow::Borrowed(self);
+            return film;
         }
-        let neighbours = self.neighbours(every);
-        let mut tracks = Vec::with_capacity(self.tracks.len());
-        for track in &self.tracks {
+        let neighbours = film.neighbours(every);
+        let mut tracks = Vec::with_capacity(film.tracks.len());
+        for track in &film.tracks {
             let places = neighbours
                 .iter()
                 .map(|of| mean_px(&track.at_px[of.clone()]));
@@ -164,7 +164,7 @@ impl Film {
         }
         let times_s = neighbours.iter().map(|of| {
             let frames = of.len() as f64;
-            self.times_s[of.clone()].iter().sum::<f64>() / frames
+            film.times_s[of.clone()].iter().sum::<f64>() / frames
         });
         Cow::Owned(Self {
             times_s: times_s.collect(),

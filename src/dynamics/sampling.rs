@@ -22,10 +22,7 @@ const SHOWN_BY_MEANS: f64 = 0.3;
 /// to `highest_hz`.
 pub(super) fn of_release(film: &Film, frames: Range<usize>, highest_hz: f64) -> Cow<'_, Film> {
     let every = nearest_to_rate(film, FRAMES_PER_PERIOD * highest_hz);
-    match film.part(frames) {
-        Cow::Borrowed(whole) => whole.in_means_of(every),
-        Cow::Owned(part) => Cow::Owned(part.in_means_of(every).into_owned()),
-    }
+    Film::in_means_of(film.part(frames), every)
 }
 
 /// A film of wind in such means, or fewer where it is long.
@@ -34,7 +31,7 @@ pub(super) fn of_wind(film: &Film, highest_hz: f64) -> Cow<'_, Film> {
     if film.times_s.len() / every > LONG_FILM_FRAMES {
         every = every.max(nearest_to_rate(film, LONG_FILM_HZ));
     }
-    film.in_means_of(every)
+    Film::in_means_of(Cow::Borrowed(film), every)
 }
 
 /// Highest frequency that is looked for in `film`, Hz: the frames of `filmed`, or means of them.

@@ -9,6 +9,7 @@
 //! lines alone cannot part the two. What is known of the upright does.
 
 use crate::cloud::{Registration, WoodPiece};
+use crate::signal::median;
 use nalgebra::{Point2, Point3, SMatrix, SVector, Similarity2, UnitComplex, Vector2};
 
 /// Lines are sampled at so many places in the height of the tree.
@@ -374,9 +375,8 @@ fn nearest(own: &Sample, others: &[Sample], across: f64) -> Option<(usize, f64)>
 }
 
 fn median_off(pairs: &[Beside]) -> f64 {
-    let mut offs: Vec<f64> = pairs.iter().map(|p| p.off).collect();
-    let middle = offs.len() / 2;
-    *offs.select_nth_unstable_by(middle, f64::total_cmp).1
+    let offs = pairs.iter().map(|p| p.off).collect();
+    median(offs, f64::total_cmp).unwrap_or(0.0)
 }
 
 #[cfg(test)]

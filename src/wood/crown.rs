@@ -61,11 +61,15 @@ pub fn refuse_other(
     let holds_wood = wood_share(crown, branches) >= LEAST_WOOD;
     let foot = branches.nodes.first().map(|foot| foot.position_px);
     let holds_foot = foot.is_some_and(|at| crown.contains(at.x, at.y));
-    match (in_leaf, is_as_around) {
-        (false, _) if !holds_wood => return Err(NotSeen::Crown),
-        (true, true) if !holds_wood || holds_foot => return Err(NotSeen::Leaves),
-        (false, _) => return Ok(()),
-        (true, _) => {}
+    if !in_leaf {
+        return if holds_wood {
+            Ok(())
+        } else {
+            Err(NotSeen::Crown)
+        };
+    }
+    if is_as_around && (!holds_wood || holds_foot) {
+        return Err(NotSeen::Leaves);
     }
     let size = crown.size;
     let off_px = off_px(crown)?;

@@ -3,7 +3,8 @@
 //! The paper has one photograph and the user's strokes. Here the film's motion is in their place:
 //! [`steady`] takes the camera's motion out of the frames; [`evidence`] averages the tree over
 //! frames that are carried back to rest, and separates what moves with it from what stands behind;
-//! [`mask`] classifies pixels as wood or not by colour ([`bark_colour`], [`leaves`]) and by [`ridges`]; [`paths`], or [`circles`] as in the paper,
+//! [`mask`] classifies pixels as wood or not by colour ([`bark_colour`], [`leaves`]) and by [`ridges`];
+//! [`paths`], or [`circles`] as in the paper,
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
 //! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
 //! strokes in place of motion; [`foliage`] finds its leaves, and [`contrast`] says whether a stroke is on
