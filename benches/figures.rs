@@ -2,6 +2,7 @@
 //!
 //! Each is printed on a line of its own with its bound; criterion's statistics stand above them.
 
+mod photo;
 #[path = "../tests/support/mod.rs"]
 mod support;
 #[path = "../tests/synthetic/mod.rs"]
@@ -28,10 +29,14 @@ use std::sync::Arc;
 use std::time::Duration;
 use tracking::{median, timed_ms};
 
-/// With a word, `make bench ONLY=tracking`, `ONLY=wood`, `ONLY=pose` or `ONLY=animate`, only the
-/// figures of the tracker, of the static tree, of the pose of many branches and the model's file,
-/// or of the animation.
+/// With a word, `make bench ONLY=tracking`, `ONLY=wood`, `ONLY=pose`, `ONLY=animate` or `ONLY=photo`,
+/// only the figures of the tracker, of the static tree, of the pose of many branches and the model's
+/// file, of the animation, or of made photographs.
 fn main() {
+    if std::env::args().any(|a| a == "photo") {
+        photo::table().iter().for_each(|line| println!("{line}"));
+        return;
+    }
     if std::env::args().any(|a| a == "animate") {
         println!("{}", animation());
         return;

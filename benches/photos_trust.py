@@ -207,31 +207,32 @@ def none(photo):
         cv2.imwrite(str(path), image[top:bottom, left:right])
         out, said = photo.run(picture=path)
         percent = re.search(r"chance of (\d+) %", said[1])
-        row = dict(part=PARTS.index(part), made=out is not None, says=int(percent[1]) / 100 if percent else None) | evidence(said[1])
+        row = dict(part=PARTS.index(part), made=out is not None, says=int(percent[1]) / 100 if percent else None)
         if out:
+            row |= evidence(out)
             row["right"] = is_right(photo, out, (left, top, right, bottom), foot - (left, top))
         else:
             row["said"] = said[0]
         yield row
 
 
-def evidence(said):
-    """By how many standard errors the trunk is said to differ from what is beside it."""
-    found = re.search(r"the trunk differs .* by (-?[\d.]+) standard", said)
-    return dict(trunk=float(found[1]) if found else 0.0)
+def evidence(out):
+    """What the tree's certainty rests on."""
+    found = json.loads((out / "capture.json").read_text())["found"]
+    return dict(trunk=found["trunk_deviations"], level=found["level_share"])
 
 
 def fit(args):
     """Logistic regression of whether trees are right, by Newton's method; a weak prior (variance 10) keeps it finite."""
     rows = [r for path in args.seeds for r in json.loads(Path(path).read_text()) if r["made"]]
-    x = np.array([[1, np.clip(r["trunk"], 0, MOST_DEVIATIONS), not r["bare"]] for r in rows], float)
+    x = np.array([[1, np.clip(r["trunk"], 0, MOST_DEVIATIONS), not r["bare"], 10 * r["level"]] for r in rows], float)
     y = np.array([r["right"] for r in rows], float)
     weights = np.zeros(x.shape[1])
     for _ in range(50):
         chance = 1 / (1 + np.exp(-x @ weights))
         hessian = (x * (chance * (1 - chance))[:, None]).T @ x + 0.1 * np.eye(len(weights))
         weights += np.linalg.solve(hessian, x.T @ (y - chance) - 0.1 * weights)
-    print(f"{len(rows)} trees, {int(y.sum())} right; once, by trunk, in leaf:", weights.round(2).tolist())
+    print(f"{len(rows)} trees, {int(y.sum())} right; once, by trunk, in leaf, by a tenth of level length:", weights.round(2).tolist())
 
 
 def is_right(photo, out, part, foot_px):

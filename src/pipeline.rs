@@ -52,7 +52,7 @@ pub use film_log::{FilmLog, KeptFrame};
 pub use front::FrontEnd;
 pub use grown::stand_grown;
 #[cfg(feature = "opencv")]
-pub use photograph::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
+pub use photograph::{DrawnPart, PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, grown_terms, reshape};

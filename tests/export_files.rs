@@ -201,6 +201,7 @@ fn a_capture_reads_back_as_it_was_written_and_is_the_same_every_time() {
         bark: None,
         masks: None,
         scan: None,
+        found: None,
         build: None,
         refinement: None,
         quality: Quality {

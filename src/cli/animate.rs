@@ -56,7 +56,10 @@ pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
     let mut tree = prepare_tree(args)?;
     let (poses, what) = match args.magnify {
         Some(factor) => magnify_film(args, &tree, factor)?,
-        None => simulate(args, &tree, sound)?,
+        None => {
+            warn_of_guesses(std::slice::from_ref(&tree));
+            simulate(args, &tree, sound)?
+        }
     };
     tree.animate(poses, args.looped, what);
     write(args, out, kind, &tree, &stop)
@@ -82,6 +85,7 @@ fn show_live(args: &AnimateArgs) -> Result<(), CommandError> {
             Box::new(FilmAnimation::new(&tree, options).map_err(CommandError::failed)?)
         }
         None => {
+            warn_of_guesses(std::slice::from_ref(&tree));
             let mut animator = animator(&tree, sound, WIND_PERIOD_S);
             animator.warm_up();
             Box::new(WindAnimation::new(&tree, animator))
@@ -163,15 +167,27 @@ fn animator(tree: &PreparedTree, sound: Option<Loudness>, period_s: f64) -> Anim
         wind = wind.driven_by(sound);
     }
     let measured: Vec<Known> = tree.sway.iter().map(Known::of).collect();
-    let animator = Animator::new(tree.skeleton.clone(), &measured, settings, wind);
-    if animator.tuning().all(|t| !t.measured) {
-        eprint_line(&format!(
-            "arborcam: warning: the tree has no frequency of any branch; they are taken from \
-             thickness and length, the trunk's from wind.trunk_hz ({} Hz)",
-            settings.trunk_hz
-        ));
-    }
-    animator
+    Animator::new(tree.skeleton.clone(), &measured, settings, wind)
+}
+
+/// Warns once of all `trees` of which no frequency is known.
+fn warn_of_guesses(trees: &[PreparedTree]) {
+    let guessed = trees
+        .iter()
+        .filter(|tree| !tree.sway.iter().any(Result::is_ok));
+    let guessed: Vec<&PreparedTree> = guessed.collect();
+    let Some(first) = guessed.first() else {
+        return;
+    };
+    let which = match trees.len() {
+        1 => "the tree has".to_owned(),
+        all => format!("{} of {all} trees have", guessed.len()),
+    };
+    eprint_line(&format!(
+        "arborcam: warning: {which} no frequency of any branch; they are taken from thickness and length, the \
+         trunk's from wind.trunk_hz ({} Hz)",
+        first.config.wind.trunk_hz
+    ));
 }
 
 /// Simulates the tree in the wind, or pulled and released. Returns the poses, and a description of

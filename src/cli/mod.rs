@@ -39,6 +39,7 @@ mod supervisor;
 mod tree;
 mod unused;
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
 use output::eprint_line;
@@ -145,10 +146,14 @@ fn status(error: &CommandError) -> ExitCode {
     ExitCode::from(status)
 }
 
-/// Prints an error of the argument parser in the form of all other errors. Help and version are
-/// such "errors" as well; they are printed as they are.
+/// Prints an error of the argument parser in the form of all other errors: of a value that an option
+/// does not take, in one line. Help and version are such "errors" as well; they are printed as they are.
 fn print_parse_error(e: &clap::Error) -> ExitCode {
     let text = e.render().to_string();
+    let text = match (e.kind(), text.split_once("\n\n")) {
+        (ErrorKind::ValueValidation, Some((line, _))) => line,
+        _ => &text,
+    };
     match text.strip_prefix("error: ") {
         Some(what) => eprint_line(&format!("arborcam: {}", what.trim_end())),
         None => drop(e.print()),

@@ -41,6 +41,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
         return draw_forest(&forest, &args.shot(), kind, &args.out, &stop);
     }
     let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
+    if kind == Kind::Video && !args.shot().turntable && !tree.document.has_motion() {
+        return Err(CommandError::BadUsage(anyhow!(
+            "the tree is at rest, as no motion of it was filmed; `arborcam animate` lets it sway in a video, and \
+             --view turntable goes round it"
+        )));
+    }
     if args.film.is_some() && tree.document.picture.is_none() {
         return Err(CommandError::Failed(anyhow!(
             "the capture holds no frame of the film; leave --film out"

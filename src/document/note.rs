@@ -58,6 +58,9 @@ pub struct CaptureNote {
     /// `None` but for trees of point clouds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scan: Option<ScanNote>,
+    /// `None` but for trees that were found in a photograph without a stroke.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub found: Option<FoundNote>,
     /// `None` if the capture ended before the tree was built.
     pub build: Option<Build>,
     /// `None` if the tree is the one that was built first.
@@ -73,6 +76,17 @@ pub struct CaptureNote {
     pub animation: Option<AnimationNote>,
     /// What the user should know before trusting the result, one sentence each.
     pub warnings: Vec<String>,
+}
+
+/// How sure what was found in a photograph without a stroke is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FoundNote {
+    /// That it is right, 0 to 1.
+    pub chance: f64,
+    /// By how many standard errors the trunk differs from what is beside it.
+    pub trunk_deviations: f64,
+    /// The share of the branches' length that runs level, as edges of buildings do.
+    pub level_share: f64,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -444,6 +458,7 @@ impl CaptureNote {
             leaves: None,
             masks: None,
             scan: None,
+            found: None,
             build: None,
             refinement: None,
             quality: Quality::default(),

@@ -2,12 +2,15 @@
 
 use super::Size;
 use crate::signal::distance_to_segment;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
 /// A place is on a piece of wood within so many of its radii, and so many pixels at 640 px picture
 /// width.
 const REACH_RADII: f64 = 1.5;
 const REACH_PX: f64 = 8.0;
+
+/// Level is what rises by less than this, degrees: of what runs to all sides alike a thirtieth.
+const LEVEL_DEG: f64 = 3.0;
 
 /// Radius of a branch by that of its parent where it is not seen (Tan et al. 2008 sect. 2.2).
 pub const RADIUS_SHARE: f64 = 0.75;
@@ -43,13 +46,24 @@ pub struct BranchGraph {
 }
 
 impl BranchGraph {
+    /// Each piece's way from its begin to its end, px.
+    fn ways_px(&self) -> impl Iterator<Item = Vector2<f64>> {
+        self.nodes.iter().filter_map(|node| {
+            let parent = self.nodes.get(node.parent?)?;
+            Some(node.position_px - parent.position_px)
+        })
+    }
+
     /// Length of all branches, px.
     pub fn length_px(&self) -> f64 {
-        let lengths = self.nodes.iter().filter_map(|node| {
-            let parent = self.nodes.get(node.parent?)?;
-            Some((node.position_px - parent.position_px).norm())
-        });
-        lengths.sum()
+        self.ways_px().map(|way| way.norm()).sum()
+    }
+
+    /// The share of the length that runs level in the picture, to 3 degrees; 0 without length.
+    pub fn level_share(&self) -> f64 {
+        let level = self.ways_px().filter(is_level);
+        let level_px: f64 = level.map(|way| way.norm()).sum();
+        level_px / self.length_px().max(f64::MIN_POSITIVE)
     }
 
     /// Length of what of the branches is at places that `is_within` holds for, px.
@@ -128,6 +142,10 @@ impl BranchGraph {
     }
 }
 
+fn is_level(way: &Vector2<f64>) -> bool {
+    way.y.abs().atan2(way.x.abs()) < LEVEL_DEG.to_radians()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +188,13 @@ mod tests {
     fn all_pieces_together_have_a_length() {
         assert!((fork().length_px() - 200.0).abs() < 1e-9);
         assert!((fork().length_within_px(|_| true) - 200.0).abs() < 1e-9);
+        assert_eq!(fork().level_share(), 0.0);
+        let mut with_ledge = fork();
+        with_ledge
+            .nodes
+            .push(WoodNode::made_up(Some(3), 90.0, 71.0));
+        assert!((with_ledge.level_share() - 0.2).abs() < 1e-3);
+        assert_eq!(BranchGraph::default().level_share(), 0.0);
         assert_eq!(fork().length_within_px(|_| false), 0.0);
         assert_eq!(fork().children(), [vec![1], vec![2, 3], vec![], vec![]]);
         assert_eq!(fork().tips(), 2);

@@ -45,10 +45,18 @@ pub struct TreeInPhoto {
     pub has_colour: bool,
 }
 
+/// A part of what is drawn on a photograph.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DrawnPart {
+    Crown,
+    /// A branch stroke, counted from 1.
+    Branch(usize),
+}
+
 /// Why a photograph shows no tree. Each message is one line that says what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum PhotoError {
-    #[error("the crown stroke: {0}; draw a closed line round the crown")]
+    #[error("the crown stroke: {0}; draw it in the photograph, round the crown")]
     BadCrown(OutlineError),
     #[error("stroke {number}: ({u:.0}, {v:.0}) lies outside the photograph; draw it on the tree")]
     OffPicture { number: usize, u: f64, v: f64 },
@@ -77,6 +85,14 @@ pub enum PhotoError {
     NoLeaves { colour: LeafColour },
     #[error("no tree with a trunk is found in its middle; draw its crown and its trunk")]
     NoTree,
+    #[error(
+        "no trunk is found that leads to what the crown stroke is round; draw the trunk, too, or the crown anew"
+    )]
+    NoTrunk,
+    #[error(
+        "no crown is found on the stroke that is drawn; draw the crown, too, or the trunk anew"
+    )]
+    NoCrownOn,
     #[error("no wood is seen that leads to the foot of the trunk; draw the trunk on its bark")]
     NoWood,
     #[error(transparent)]
@@ -93,7 +109,24 @@ pub enum PhotoError {
 impl PhotoError {
     /// Whether the tree was not found, or not whole: strokes help.
     pub fn is_of_picture(&self) -> bool {
-        matches!(self, Self::NoTree | Self::NoWood | Self::NoRegion(_))
+        matches!(
+            self,
+            Self::NoTree | Self::NoTrunk | Self::NoCrownOn | Self::NoWood | Self::NoRegion(_)
+        )
+    }
+
+    /// What of the drawing it is about; `None` if that is the photograph.
+    pub fn at_fault(&self) -> Option<DrawnPart> {
+        match self {
+            Self::BadCrown(_) | Self::EmptyCrown | Self::NoCrown | Self::CrownApart => {
+                Some(DrawnPart::Crown)
+            }
+            Self::OffPicture { number, .. } | Self::Apart { number } => {
+                Some(DrawnPart::Branch(*number))
+            }
+            Self::OnNothing => Some(DrawnPart::Branch(1)),
+            _ => None,
+        }
     }
 
     /// Whether what was drawn is at fault, and not the photograph.
@@ -197,14 +230,18 @@ impl Looked<'_> {
                         continue;
                     }
                 };
-                let found = Certainty::of(&tree.seen);
+                let found = Certainty::of(&tree.seen, tree.has_colour);
                 let known = best.as_ref().map_or(0.0, |(known, _)| known.chance());
                 if found.chance() > known {
                     best = Some((found, tree));
                 }
             }
         }
-        let (found, tree) = best.ok_or(why)?;
+        let (found, tree) = best.ok_or(match why {
+            PhotoError::NoTree if half.crown.is_some() => PhotoError::NoTrunk,
+            PhotoError::NoTree if !half.strokes.is_empty() => PhotoError::NoCrownOn,
+            why => why,
+        })?;
         let found = Some(found);
         Ok(TreeInPhoto { found, ..tree })
     }

@@ -392,6 +392,7 @@ pub(super) fn describe(
         depth: tree.and_then(depth_note),
         leaves: None,
         scan: None,
+        found: None,
         bark: tree.and_then(bark_of).map(|_| BarkNote {
             file: BARK_FILE.into(),
         }),

@@ -28,7 +28,7 @@ const HEIC_BRANDS: [&[u8; 4]; 4] = [b"heic", b"heix", b"mif1", b"msf1"];
 #[derive(Debug, thiserror::Error)]
 pub enum PhotographError {
     #[error(
-        "it is no picture that can be read ({what}); give a PNG or JPEG file, or --frame for a film"
+        "it is no picture that can be read ({what}); give a PNG, JPEG or BMP file, or --frame for a film"
     )]
     BadFormat { what: String },
     #[error("it is a {format} picture, which is not read; save it as PNG or JPEG, and give that")]

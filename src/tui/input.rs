@@ -229,7 +229,7 @@ pub fn handle(event: &Event, state: &mut State, placed: Option<&Placed>) -> Opti
 fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<Control> {
     if key.modifiers.contains(KeyModifiers::CONTROL) {
         return if key.code == KeyCode::Char('c') {
-            act(Action::Quit, state)
+            act(Action::Quit, state, placed)
         } else {
             None
         };
@@ -257,7 +257,7 @@ fn press(key: &KeyEvent, state: &mut State, placed: Option<&Placed>) -> Option<C
         ));
         return None;
     }
-    act(bound.action, state)
+    act(bound.action, state, placed)
 }
 
 /// Whether an action waits until `subject` is drawn: a slip must not end or restart the capture of
@@ -270,7 +270,7 @@ fn waits(action: Action, subject: Subject) -> bool {
     }
 }
 
-fn act(action: Action, state: &mut State) -> Option<Control> {
+fn act(action: Action, state: &mut State, placed: Option<&Placed>) -> Option<Control> {
     let looks = matches!(
         action,
         Action::Help
@@ -289,8 +289,19 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
             state.help = !state.help;
             return None;
         }
+        Action::Draw(subject) if state.snapshot.preview.is_none() => {
+            let name = subject.name();
+            state.say(format!(
+                "There is no picture yet on which {name} could be drawn."
+            ));
+            return None;
+        }
         Action::Draw(subject) => {
-            begin_drawing(subject, state);
+            match subject {
+                Subject::Outline | Subject::Markers => state.unsay(),
+                Subject::Branch => state.say(wood::told(&state.snapshot)),
+            }
+            begin_drawing(subject, state, placed);
             return None;
         }
         Action::Turn(steps) => {
@@ -334,17 +345,14 @@ fn act(action: Action, state: &mut State) -> Option<Control> {
     Some(control)
 }
 
-fn begin_drawing(subject: Subject, state: &mut State) {
-    if state.snapshot.preview.is_none() {
-        state.say("There is no picture yet to draw on.");
-        return;
-    }
+/// Goes on with what is being drawn, or begins to draw `subject`, with the cross in the middle of the picture.
+pub(super) fn begin_drawing(subject: Subject, state: &mut State, placed: Option<&Placed>) {
     state.help = false;
-    match subject {
-        Subject::Outline | Subject::Markers => state.unsay(),
-        Subject::Branch => state.say(wood::told(&state.snapshot)),
+    if state.drawing.is_none() {
+        let mut drawing = Drawing::of(subject);
+        move_cursor(&mut drawing, placed, 0, 0);
+        state.drawing = Some(drawing);
     }
-    state.drawing.get_or_insert_with(|| Drawing::of(subject));
 }
 
 pub(super) fn click(column: u16, row: u16, state: &mut State, placed: Option<&Placed>) {

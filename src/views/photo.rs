@@ -4,7 +4,7 @@ use super::drawn::DrawnTree;
 use super::{Draft, PrepareError, write_document};
 use crate::config::{Config, LeafShow};
 use crate::document::Document;
-use crate::document::note::{BarkNote, MasksNote, ModelNote, PictureNote};
+use crate::document::note::{BarkNote, FoundNote, MasksNote, ModelNote, PictureNote};
 use crate::document::{BARK_FILE, LEAVES_MASK_FILE, PICTURE_FILE, REST_FILE, WOOD_MASK_FILE};
 use crate::grow::{Growth, GrowthRegion, Library, ROUNDS, SubtreeKind, grow_subtrees, sample_sway};
 use crate::import::FlatTree;
@@ -161,6 +161,11 @@ impl PhotoTree {
             file: PICTURE_FILE.into(),
             frame: parts.picture.frame,
             time_s: parts.picture.time_s,
+        });
+        note.found = parts.tree.found.map(|found| FoundNote {
+            chance: found.chance(),
+            trunk_deviations: found.trunk_deviations,
+            level_share: found.level_share,
         });
         note.bark = wood.bark.as_ref().map(|_| BarkNote {
             file: BARK_FILE.into(),

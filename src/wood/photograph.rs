@@ -43,6 +43,8 @@ const LEAF_ODDS: f32 = -4.0;
 /// has so great a radius at least.
 const THICK: f32 = 2.5;
 const LEAST_TRUNK_PX: f32 = 3.0;
+/// Below the trunk's foot, within so many of its radii, there are no branches.
+const NEAR_FOOT: f64 = 10.0;
 /// Where so great a share of a piece of a branch is leaves, its width is not seen.
 const HIDDEN: f64 = 0.5;
 
@@ -75,6 +77,8 @@ pub struct SeenInPhotograph {
     pub doubtful: Vec<usize>,
     /// The leaves have the colours of what is around the crown, as those of a lawn do.
     pub is_as_around: bool,
+    /// The share of the branches' length that runs level, as edges of buildings do.
+    pub level_share: f64,
 }
 
 /// Why a photograph does not show what was drawn on it.
@@ -122,13 +126,14 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         return Err(NotSeen::Cancelled);
     }
     let mut is_as_around = false;
-    let leaves = match foliage {
+    let mut leaves = match foliage {
         Some(foliage) => {
             is_as_around = crown::is_as_around(crown::deviations(&photo, &foliage)?);
-            crown::without_far_pieces(foliage.mask, size)?
+            foliage.mask
         }
         None => vec![0; size.area()],
     };
+    crown::without_far_pieces(&mut leaves, size)?;
     let in_leaf = leaves.iter().any(|leaf| *leaf != 0);
     if let (Some(colour), false) = (photo.leaf_colour, in_leaf) {
         return Err(NotSeen::LeavesOf(colour));
@@ -145,10 +150,12 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         true => traced,
         false => faint::without_faint(traced, photo.picture),
     };
+    branches = without_roots(&branches);
     if branches.nodes.len() < 2 {
         return Err(NotSeen::Wood);
     }
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
+    let level_share = branches.level_share();
     hide_radii(&mut branches, &leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -176,6 +183,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         trunk_deviations: on_strokes.trunk_deviations,
         doubtful: on_strokes.doubtful,
         is_as_around: mask.in_leaf && is_as_around,
+        level_share,
     })
 }
 
@@ -283,6 +291,33 @@ fn without_wood(size: Size, leaves: &[u8]) -> WoodMask {
     }
 }
 
+/// The branches without those near the trunk's foot that lead below it: what is there is the ground, or a plant
+/// on it.
+fn without_roots(branches: &BranchGraph) -> BranchGraph {
+    let Some(foot) = branches.nodes.first() else {
+        return BranchGraph::default();
+    };
+    let mut is_kept = vec![true; branches.nodes.len()];
+    let mut carries = vec![Carries::default(); branches.nodes.len()];
+    for (i, node) in branches.nodes.iter().enumerate().rev() {
+        let Some(parent) = node.parent else { continue };
+        let off_px = node.position_px - foot.position_px;
+        let is_below = off_px.y > foot.radius_px && off_px.norm() < NEAR_FOOT * foot.radius_px;
+        let leads_below = carries[i].all > 0 && carries[i].kept == 0;
+        is_kept[i] = !is_below && !leads_below;
+        carries[parent].all += 1;
+        carries[parent].kept += usize::from(is_kept[i]);
+    }
+    branches.of_nodes(&is_kept)
+}
+
+/// How many nodes have one as their parent, and how many of these are kept.
+#[derive(Clone, Copy, Debug, Default)]
+struct Carries {
+    all: usize,
+    kept: usize,
+}
+
 /// Sets the radius of pieces that leaves hide to 0: a stroke through leaves is a branch, and is no
 /// measure of its width.
 fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
@@ -335,6 +370,7 @@ fn rounded(at: &Point2<f64>) -> Point {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::WoodNode;
     use crate::random::seed_of_part;
     use crate::signal::distance_to_segment;
 
@@ -445,6 +481,25 @@ mod tests {
         for (wood, leaf) in masks.wood.pixels.iter().zip(&masks.leaves.pixels) {
             assert!(u32::from(*wood) + u32::from(*leaf) <= 255);
         }
+    }
+
+    #[test]
+    fn what_leads_below_the_foot_is_no_branch() {
+        let mut graph = BranchGraph::default();
+        for (parent, u, v) in [
+            (None, 100.0, 200.0),
+            (Some(0), 100.0, 190.0),
+            (Some(1), 100.0, 50.0),
+            (Some(1), 112.0, 192.0),
+            (Some(3), 116.0, 208.0),
+            (Some(4), 122.0, 200.0),
+            (Some(2), 190.0, 210.0),
+        ] {
+            graph.nodes.push(WoodNode::made_up(parent, u, v));
+        }
+        let kept = without_roots(&graph);
+        let places: Vec<f64> = kept.nodes.iter().map(|n| n.position_px.x).collect();
+        assert_eq!(places, [100.0, 100.0, 100.0, 190.0]);
     }
 
     #[test]

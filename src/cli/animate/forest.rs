@@ -4,7 +4,7 @@ use super::super::command_error::CommandError;
 use super::super::render;
 use super::super::stop::Stop;
 use super::options::Kind;
-use super::{AnimateArgs, read_wav, simulate, to_string, write_model};
+use super::{AnimateArgs, read_wav, simulate, to_string, warn_of_guesses, write_model};
 use crate::views::{PreparedForest, Shot};
 use anyhow::anyhow;
 use std::path::Path;
@@ -20,6 +20,7 @@ pub fn run(args: &AnimateArgs, out: &Path, kind: Kind, stop: &Stop) -> Result<()
         )));
     }
     let sound = args.wav.as_deref().map(read_wav).transpose()?;
+    warn_of_guesses(&forest.templates);
     for template in 0..forest.templates.len() {
         let metres_per_px = forest.metres_per_px(template);
         let tree = &mut forest.templates[template];

@@ -2,7 +2,6 @@
 
 use super::drawn::DrawnTree;
 use super::kept::KeptStrokes;
-use super::nothing_drawn;
 use super::picture::ShownPicture;
 use crate::cli::command_error::CommandError;
 use crate::cli::hangup::SighupAction;
@@ -74,6 +73,7 @@ fn found(tree: TreeInPhoto) -> FoundTree {
         wood: tree.seen.wood,
         in_leaf: tree.seen.in_leaf,
         certainty: tree.found.map(|found| found.chance()),
+        is_likely: tree.found.is_none_or(|found| found.is_likely()),
     }
 }
 
@@ -109,7 +109,7 @@ pub fn on_screen(
     }
     let drawn = trees.into_iter().map(|strokes| DrawnTree {
         strokes,
-        ..nothing_drawn()
+        ..DrawnTree::default()
     });
     Ok(drawn.collect())
 }

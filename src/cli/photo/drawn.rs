@@ -1,12 +1,12 @@
 //! The strokes of `arborcam photo` that are given as files.
 
-use super::nothing_drawn;
 use super::picture::ShownPicture;
 use crate::cli::command_error::CommandError;
 use crate::cli::line::of_another_picture;
 use crate::files::read_bounded;
 use crate::import::{ImportError, Sketch, Stroke, read_strokes};
 use crate::model::{TreeStrokes, scaled};
+use crate::pipeline::{DrawnPart, PhotoError};
 use anyhow::anyhow;
 use clap::Args;
 use std::path::Path;
@@ -45,11 +45,23 @@ struct StrokeFile {
 }
 
 /// The strokes of one tree, px of the picture that is worked on.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DrawnTree {
-    /// Where they are from, if all are from one file.
-    pub file: Option<String>,
     pub strokes: TreeStrokes,
+    /// The files that they are from; none of what was drawn on the screen.
+    pub crown_file: Option<String>,
+    /// By branch stroke.
+    pub branch_files: Vec<String>,
+}
+
+impl DrawnTree {
+    /// The file with what an error is about; `None` if that is the photograph.
+    pub fn file_of(&self, e: &PhotoError) -> Option<&String> {
+        match e.at_fault()? {
+            DrawnPart::Crown => self.crown_file.as_ref(),
+            DrawnPart::Branch(number) => self.branch_files.get(number.checked_sub(1)?),
+        }
+    }
 }
 
 impl StrokeFile {
@@ -114,7 +126,8 @@ impl StrokeFiles {
                 )));
             }
             trees.push(DrawnTree {
-                file: Some(file.name.clone()),
+                crown_file: Some(file.name.clone()),
+                branch_files: vec![file.name.clone(); strokes.branches_px.len()],
                 strokes: strokes.scaled(file.scale("--tree", shown)?),
             });
         }
@@ -123,13 +136,14 @@ impl StrokeFiles {
 
     /// What `--crown` and `--branch` give.
     fn single(&self, shown: &ShownPicture) -> Result<DrawnTree, CommandError> {
-        let mut tree = nothing_drawn();
+        let mut tree = DrawnTree::default();
         if let Some(file) = &self.crown {
             let crown_px = file.sketch.clone().only_crown_px();
             let crown_px = crown_px
                 .map_err(|e| CommandError::BadUsage(anyhow!("--crown {}: {e}", file.name)))?;
             let scale = file.scale("--crown", shown)?;
             tree.strokes.crown_px = scaled(&crown_px, scale);
+            tree.crown_file = Some(file.name.clone());
         }
         for file in &self.branches {
             let scale = file.scale("--branch", shown)?;
@@ -149,6 +163,7 @@ impl StrokeFiles {
             }
             for line in file.sketch.lines_px() {
                 tree.strokes.branches_px.push(scaled(&line, scale));
+                tree.branch_files.push(file.name.clone());
             }
         }
         Ok(tree)

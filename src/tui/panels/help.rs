@@ -1,6 +1,6 @@
 //! The help, laid over everything else.
 
-use crate::tui::input::{DRAWING, WATCHING};
+use crate::tui::input::{Binding, DRAWING, WATCHING};
 use crate::tui::layout::SMALLEST;
 use crate::tui::state::State;
 use crate::tui::theme::Theme;
@@ -22,25 +22,26 @@ const MEANINGS: [(&str, &str); 3] = [
     ("▲", "the answer in the spectrum of its angle, for the eye"),
 ];
 
-/// All keys, from the same tables that they are read with.
+/// All keys of the capture, from the same tables that they are read with.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
-    let mut lines: Vec<Line> = WATCHING
-        .iter()
-        .filter(|b| !b.help.is_empty())
-        .map(|b| row(b.shown, b.help, theme))
-        .collect();
+    let mut lines = rows(&WATCHING, theme);
     lines.push(Line::styled("What is shown of a branch", theme.faint()));
     lines.extend(MEANINGS.map(|(shown, help)| row(shown, help, theme)));
+    panel(frame, lines, state, area, theme);
+}
+
+/// All keys of the screen on which a user draws on a photograph.
+pub fn of_photograph<A>(frame: &mut Frame, keys: &[Binding<A>], state: &State, theme: Theme) {
+    panel(frame, rows(keys, theme), state, frame.area(), theme);
+}
+
+/// These lines and the keys while something is drawn.
+fn panel<'a>(frame: &mut Frame, mut lines: Vec<Line<'a>>, state: &State, area: Rect, theme: Theme) {
     let mut drawing = vec![
         Line::styled("While an outline or a line is drawn", theme.faint()),
         row("click", "sets a point", theme),
     ];
-    drawing.extend(
-        DRAWING
-            .iter()
-            .filter(|b| !b.help.is_empty())
-            .map(|b| row(b.shown, b.help, theme)),
-    );
+    drawing.extend(rows(&DRAWING, theme));
     // Where there is no room for both, those that mean something now.
     if lines.len() + drawing.len() + 2 <= area.height as usize {
         lines.append(&mut drawing);
@@ -56,6 +57,12 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
         .padding(Padding::horizontal(1));
     frame.render_widget(Clear, area);
     frame.render_widget(Paragraph::new(lines).block(block), area);
+}
+
+/// The keys that have an explanation.
+fn rows<A>(keys: &[Binding<A>], theme: Theme) -> Vec<Line<'static>> {
+    let explained = keys.iter().filter(|b| !b.help.is_empty());
+    explained.map(|b| row(b.shown, b.help, theme)).collect()
 }
 
 fn row(key: &'static str, help: &'static str, theme: Theme) -> Line<'static> {

@@ -25,6 +25,7 @@ struct Puppet {
     kept: Vec<TreeStrokes>,
     /// It takes its time.
     is_slow: bool,
+    certainty: Option<f64>,
 }
 
 impl PhotoSession for Puppet {
@@ -69,7 +70,8 @@ impl PhotoSession for Puppet {
                 at_rest: Some(Arc::new(AtRest::made_up(SIZE))),
             },
             in_leaf: false,
-            certainty: None,
+            certainty: self.certainty,
+            is_likely: self.certainty.is_none_or(|chance| chance >= 0.5),
         }))
     }
 }
@@ -298,4 +300,48 @@ fn the_screen_leaves_by_its_keys_and_draws_in_any_window() {
         let with_control = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(screen.event(&Event::Key(with_control)), Next::Quit);
     }
+}
+
+#[test]
+fn what_is_more_likely_wrong_is_accepted_by_the_second_key_only() {
+    let mut screen = Screen::new(80, 24);
+    screen.puppet.certainty = Some(0.21);
+    screen.stroke('b', &TRUNK);
+    assert_eq!(screen.press(KeyCode::Enter), Next::Stay);
+    assert!(screen.shown().contains("once more"), "{}", screen.shown());
+    assert_eq!(screen.press(KeyCode::Char('w')), Next::Stay);
+    assert_eq!(
+        screen.press(KeyCode::Enter),
+        Next::Stay,
+        "another key between"
+    );
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+    let mut screen = Screen::new(80, 24);
+    screen.puppet.certainty = Some(0.8);
+    screen.stroke('b', &TRUNK);
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
+}
+
+#[test]
+fn the_cross_is_there_from_the_beginning_and_the_help_names_the_keys() {
+    let mut screen = Screen::new(80, 24);
+    screen.press(KeyCode::Char('b'));
+    assert!(screen.shown().contains('X'), "{}", screen.shown());
+    screen.press(KeyCode::Char(' '));
+    screen.press(KeyCode::Char('K'));
+    screen.press(KeyCode::Char(' '));
+    assert_eq!(screen.press(KeyCode::Enter), Next::Look);
+    screen.press(KeyCode::Char('?'));
+    assert!(
+        screen.shown().contains("round the crown"),
+        "{}",
+        screen.shown()
+    );
+    assert_eq!(screen.press(KeyCode::Esc), Next::Stay);
+    assert!(
+        !screen.shown().contains("round the crown"),
+        "{}",
+        screen.shown()
+    );
+    assert_eq!(screen.press(KeyCode::Enter), Next::Accept);
 }

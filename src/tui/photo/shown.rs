@@ -1,0 +1,123 @@
+//! How a photograph looks with what is drawn on it and found along it.
+
+use super::sheet::{KEYS, Sheet};
+use crate::model::{BranchGraph, Masks, Rgb, Snapshot, Wood, WoodNode};
+use crate::tui::panels::preview::{self, Preview};
+use crate::tui::panels::{help, messages};
+use crate::tui::theme::Theme;
+use ratatui::Frame;
+use ratatui::layout::{Constraint, Layout};
+use ratatui::text::Line;
+use std::sync::Arc;
+
+/// What leaves and wood are tinted with where they are found, and how far the tint covers the picture.
+const LEAVES_TINT: [u8; 3] = [0x20, 0xe0, 0x40];
+const WOOD_TINT: [u8; 3] = [0xff, 0x90, 0x30];
+const TINT: f64 = 0.45;
+impl Sheet {
+    /// Puts what is drawn and found into what the picture is made of.
+    pub(super) fn show(&mut self) {
+        let mut snapshot = Snapshot {
+            image_size: Some(self.picture.size),
+            ..Snapshot::default()
+        };
+        let mut shown = None;
+        let mut branches = BranchGraph::default();
+        for tree in &self.trees {
+            for line in &tree.strokes.branches_px {
+                let points = line.iter().map(|at| [at.x, at.y]);
+                snapshot.strokes_px.push(points.collect());
+            }
+            let Some(Ok(found)) = tree.found.as_deref() else {
+                continue;
+            };
+            append(&mut branches, &found.wood.branches);
+            if let (true, Some(at_rest)) = (self.state.wood, &found.wood.at_rest) {
+                let own = shown.get_or_insert_with(|| Rgb::clone(&self.picture));
+                tint(own, &at_rest.masks);
+            }
+        }
+        if let Some(tree) = self.trees.last() {
+            let corners = tree.strokes.crown_px.iter();
+            snapshot.outline_px = corners.map(|at| at.map(|x| x.round() as i32)).collect();
+        }
+        snapshot.preview = Some(shown.map_or_else(|| self.picture.clone(), Arc::new));
+        snapshot.wood = Some(Arc::new(Wood {
+            branches,
+            ..Wood::default()
+        }));
+        self.state.take(Arc::new(snapshot));
+    }
+
+    pub fn render(&self, frame: &mut Frame, theme: Theme, picture: &mut Preview) {
+        let [line, sheet, message, keys] = Layout::vertical([
+            Constraint::Length(1),
+            Constraint::Fill(1),
+            Constraint::Length(1),
+            Constraint::Length(1),
+        ])
+        .areas(frame.area());
+        let number = self.trees.len();
+        let strokes = self.trees.last().map(|tree| &tree.strokes);
+        let crown = strokes.is_some_and(|s| !s.crown_px.is_empty());
+        let branches = strokes.map_or(0, |s| s.branches_px.len());
+        let crown = if crown { "a crown" } else { "no crown" };
+        let plural = if branches == 1 { "" } else { "es" };
+        let title = format!(
+            " arborcam photo  {}  tree {number}: {crown}, {branches} branch{plural} drawn",
+            self.name
+        );
+        frame.render_widget(Line::styled(title, theme.strong()), line);
+        preview::render(frame, &self.state, sheet, theme, picture);
+        match (self.looking, self.state.messages().next()) {
+            (_, Some(_)) => messages::render(frame, &self.state, message, theme),
+            (Some(looking), None) => {
+                let since_s = looking.began.elapsed().as_secs_f64();
+                let told = format!(" · Looking… {since_s:.1} s (keys work meanwhile)");
+                frame.render_widget(Line::styled(told, theme.strong()), message);
+            }
+            (None, None) => {
+                let told = Line::styled(format!(" · {}", self.told()), theme.faint());
+                frame.render_widget(told, message);
+            }
+        }
+        match self.state.drawing {
+            Some(_) => messages::keys(frame, &self.state, keys, theme),
+            None => {
+                let named = KEYS.iter().filter(|b| !b.short.is_empty());
+                messages::key_line(frame, named.map(|b| (b.shown, b.short)), keys, theme);
+            }
+        }
+        if self.state.help {
+            help::of_photograph(frame, &KEYS, &self.state, theme);
+        }
+    }
+}
+
+/// Adds the branches of another tree.
+fn append(all: &mut BranchGraph, tree: &BranchGraph) {
+    let first = all.nodes.len();
+    let nodes = tree.nodes.iter().map(|node| WoodNode {
+        parent: node.parent.map(|parent| first + parent),
+        ..node.clone()
+    });
+    all.nodes.extend(nodes);
+}
+
+/// Tints leaves and wood in a picture of the size of their masks.
+fn tint(picture: &mut Rgb, masks: &Masks) {
+    if masks.leaves.size != picture.size || masks.wood.size != picture.size {
+        return;
+    }
+    let found = masks.leaves.pixels.iter().zip(&masks.wood.pixels);
+    for (pixel, (leaf, wood)) in picture.pixels.chunks_exact_mut(3).zip(found) {
+        let colour = match (*leaf > Masks::MOST_OUTSIDE, *wood > Masks::MOST_OUTSIDE) {
+            (true, _) => LEAVES_TINT,
+            (_, true) => WOOD_TINT,
+            _ => continue,
+        };
+        for (own, tint) in pixel.iter_mut().zip(colour) {
+            *own = (TINT * f64::from(tint) + (1.0 - TINT) * f64::from(*own)) as u8;
+        }
+    }
+}
