@@ -49,12 +49,12 @@ sweep:
 
 lint: core
 	cargo fmt --check
-	cargo clippy --locked --all-targets -- -D warnings
+	cargo clippy --release --locked --all-targets -- -D warnings
 
 # The library without OpenCV, camera and terminal, with the example that uses it; the program without nokhwa.
 core:
-	cargo check --locked --no-default-features --lib --example tree_from_tracks
-	cargo clippy --locked --no-default-features --features terminal -- -D warnings
+	cargo check --release --locked --no-default-features --lib --example tree_from_tracks
+	cargo clippy --release --locked --no-default-features --features terminal -- -D warnings
 
 PREFIX ?= /usr/local
 # Where the system looks for its parts; below /usr/local it reads neither udev rules nor all of the others.
