@@ -6,7 +6,7 @@
 //! that answer.
 
 use super::mask::WoodMask;
-use super::paths::distances;
+use super::ways::distances;
 use crate::model::{BranchGraph, WoodNode};
 use nalgebra::{Point2, Vector2, distance};
 use std::collections::VecDeque;

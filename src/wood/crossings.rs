@@ -6,7 +6,8 @@
 //! such a way, and one leaves that limb beside it on the other side and goes on as the first came,
 //! they are one: at a crossing, direction decides.
 
-use super::paths::{Grid, Track};
+use super::paths::Track;
+use super::ways::Grid;
 use nalgebra::Vector2;
 use std::collections::BTreeMap;
 

@@ -6,7 +6,7 @@ use super::contrast::Around;
 use super::foliage::Foliage;
 use super::joined::Parts;
 use super::photograph::{NotSeen, Photograph};
-use super::{paths, widened};
+use super::{ways, widened};
 use crate::model::{BranchGraph, Outline, Size};
 use nalgebra::Point2;
 
@@ -42,7 +42,7 @@ pub fn deviations(photo: &Photograph, foliage: &Foliage) -> opencv::Result<Optio
 /// How far off the crown each pixel is, px; 0 within it.
 fn off_px(crown: &Outline) -> opencv::Result<Vec<f32>> {
     let inverse: Vec<u8> = crown.mask.iter().map(|m| 255 - m).collect();
-    paths::distances(&inverse, crown.size)
+    ways::distances(&inverse, crown.size)
 }
 
 /// Whether what is within a crown may be a lawn or a hedge: it does not differ from what is around it by so

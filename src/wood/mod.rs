@@ -35,6 +35,7 @@ mod probability;
 mod ridges;
 mod steady;
 mod stroke_colours;
+mod ways;
 
 pub use foliage::LeafColour;
 pub use greenery::greenery;

@@ -15,7 +15,7 @@ use super::mask::{self, WoodMask};
 use super::part::Part;
 use super::ridges::ridges;
 use super::stroke_colours::StrokeColours;
-use super::{Stroke, bark, circles, crown, faint, paths, probability, widened};
+use super::{Stroke, bark, circles, crown, faint, paths, probability, ways, widened};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
 use crate::model::{AtRest, BranchGraph, Luma, Masks, Outline, Rgb, Size, Wood};
@@ -244,7 +244,7 @@ fn wood_mask(
 /// Takes out of a mask of wood what is far thicker than its trunk, as no branch is: a wall that has the
 /// colours of bark.
 fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<()> {
-    let inside_px = paths::distances(mask, size)?;
+    let inside_px = ways::distances(mask, size)?;
     let Some(radius_px) = radius_low_px(trunk, &inside_px, size) else {
         return Ok(());
     };
@@ -254,7 +254,7 @@ fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<
         off_core.push(if *inside > thick_px { 0 } else { 255 });
     }
     if off_core.contains(&0) {
-        let off_core_px = paths::distances(&off_core, size)?;
+        let off_core_px = ways::distances(&off_core, size)?;
         for (mask, off_px) in mask.iter_mut().zip(off_core_px) {
             *mask = if off_px > thick_px { *mask } else { 0 };
         }
