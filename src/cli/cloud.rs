@@ -8,6 +8,7 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
+use crate::bounds::Bounds;
 use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud};
 use crate::config::Config;
 use crate::document::Document;
@@ -319,7 +320,15 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &fit.registration);
+        let window_s = film.note.config.dynamics.window_s;
+        let points = film.tracked_within(window_s, Bounds::new(0.0, f64::INFINITY))?;
+        let sway = sway_on_scan(
+            &document.skeleton,
+            metres_per_px,
+            &film,
+            &points,
+            &fit.registration,
+        );
         Ok(Some(FilmOnScan { fit, sway }))
     }
 }
