@@ -17,7 +17,9 @@ use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_c
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
-use crate::views::{DrawnTree, FilmFit, FilmOnScan, register_film, scan_defaults, sway_on_scan};
+use crate::views::{
+    DrawnTree, FilmFit, FilmOnScan, FilmedPoint, register_film, scan_defaults, sway_on_scan,
+};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point3, Vector3};
@@ -322,11 +324,16 @@ impl CloudArgs {
         let metres_per_px = document.note.config.export.metres_per_px;
         let window_s = film.note.config.dynamics.window_s;
         let points = film.tracked_within(window_s, Bounds::new(0.0, f64::INFINITY))?;
+        let mut filmed = Vec::with_capacity(points.tracks.len());
+        for track in &points.tracks {
+            let node = track.node;
+            filmed.extend(track.middle_px().map(|at_px| FilmedPoint { node, at_px }));
+        }
         let sway = sway_on_scan(
             &document.skeleton,
             metres_per_px,
             &film,
-            &points,
+            &filmed,
             &fit.registration,
         );
         Ok(Some(FilmOnScan { fit, sway }))

@@ -5,10 +5,8 @@
 
 use crate::cloud::{LinePlace, Registration, WoodPiece};
 use crate::document::Document;
-use crate::dynamics::{Film, FilmTrack};
 use crate::model::{BotanicalBranches, NodeId, Skeleton, Swaying, Unidentified};
 use crate::signal::distance_to_segment;
-use crate::signal::statistics::median_vector;
 use nalgebra::{Point2, Point3};
 use std::collections::BTreeMap;
 
@@ -28,6 +26,15 @@ const ACROSS_SHARE: f64 = 0.05;
 /// Places on a branch at which that is looked at.
 const PLACES: f64 = 12.0;
 
+/// A point that was followed in a film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FilmedPoint {
+    /// The deepest node that it belongs to.
+    pub node: NodeId,
+    /// The middle of its motion, px, v down.
+    pub at_px: Point2<f64>,
+}
+
 /// The sway of a film on the branches of a scanned tree, by node index. `points` are those of the film.
 /// Each filmed branch is given to the pieces of its scanned branch that lie on it. What nothing was
 /// filmed on is not measured.
@@ -35,7 +42,7 @@ pub fn sway_on_scan(
     scan: &Skeleton,
     metres_per_px: f64,
     film: &Document,
-    points: &Film,
+    points: &[FilmedPoint],
     registration: &Registration,
 ) -> Vec<Swaying> {
     let seen = SeenScan {
@@ -47,12 +54,11 @@ pub fn sway_on_scan(
     let names = scan.botanical_branches();
     let wood = seen.wood(scan);
     let mut votes: Vec<Votes> = vec![Votes::default(); film.skeleton.nodes.len()];
-    for track in &points.tracks {
-        let Some(at) = place_at_rest(track, &film.skeleton) else {
-            continue;
-        };
+    let foot_px = film.skeleton.foot_px;
+    for point in points {
+        let at = Point2::new(point.at_px.x - foot_px.x, foot_px.y - point.at_px.y);
         if let Some(node) = node_seen_at(&wood, &at, height_px) {
-            let own = film.skeleton.mover(track.node);
+            let own = film.skeleton.mover(point.node);
             let below = film.skeleton.carriers(own);
             for branch in std::iter::once(own).chain(below) {
                 votes[branch.index()].add(&names, names.of(node));
@@ -137,16 +143,6 @@ impl SeenScan<'_> {
         }
         pieces
     }
-}
-
-/// Where a point is in the middle of its motion, px, y up, the foot of `skeleton` at the origin; `None`
-/// where it was never seen.
-fn place_at_rest(track: &FilmTrack, skeleton: &Skeleton) -> Option<Point2<f64>> {
-    let seen = track.at_px.iter().filter(|at| at.x.is_finite());
-    seen.clone().next()?;
-    let middle = median_vector(seen.map(|at| at.coords));
-    let foot_px = skeleton.foot_px;
-    Some(Point2::new(middle.x - foot_px.x, foot_px.y - middle.y))
 }
 
 /// The wood that the camera sees at a place; `None` where no bark is near.
