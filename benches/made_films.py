@@ -58,16 +58,17 @@ def main():
     parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
     parser.add_argument("--depth", action="store_true", help="a depth camera films it, in real metres")
     parser.add_argument("--force", type=float, default=1.0, help="times as strong a pull")
+    parser.add_argument("--roll", type=float, default=0.0, metavar="DEG", help="the camera is rolled: the tree leans to the right in the picture")
     parser.add_argument("--rope-at", type=int, metavar="BRANCH", help="the rope is on this branch (its id in truth.json): it and what "
                         "carries it are bent, the others are only shaken by the release; without it all are bent")
     args = parser.parse_args()
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
     rope = tree.Rope(args.rope_at, args.force)
     make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers,
-         args.depth, rope)
+         args.depth, rope, args.roll)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None, roll_deg=0.0):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     if rope:
@@ -76,6 +77,7 @@ def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=Fa
     theta_rad = bad.sways(theta_rad)
     pose = motion.Pose(branches, theta_rad)
     camera = picture.Camera.framing(rng, pose.points_m)
+    camera.roll_deg = roll_deg
     camera = depth.Pinhole.like(camera) if has_depth else camera
     skin = bad.more_leaves(seed, branches, pose, surface.cover(rng, branches, pose, leafy))
     background = scenery.scenery(rng, leafy, picture.WIDTH, picture.HEIGHT)

@@ -64,20 +64,21 @@ def score(film, cloud, capture, scan):
     places, rest, filmed = map(np.concatenate, (places, rest, filmed))
     height_px = rest[:, 1].max()
     seen = project(fit, places)
-    lean = np.radians(fit.get("lean_deg") or 0.0)
-    upright = seen @ np.array([[np.cos(lean), np.sin(lean)], [-np.sin(lean), np.cos(lean)]])
+    lean_deg = fit.get("lean_deg") or 0.0
+    upright = seen @ rotation(lean_deg)
     share = lambda a, b: 100 * np.sqrt(((a - b) ** 2).sum(axis=1).mean()) / height_px
     by_truth = np.degrees(best_turn(places, rest))
     turn = (fit["turn_deg"] - by_truth + 180) % 360 - 180
     percent = lambda name: 100 * (fit.get(name) or np.nan)
     return (f"{film.name:<10}{share(seen, filmed):>8.2f}{percent('off_hi'):>8.2f}{share(upright, rest):>8.2f}{percent('rest_off_hi'):>9.2f}"
-            f"{share(seen, rest):>8.2f}{turn:>7.1f}{np.degrees(lean):>7.1f}")
+            f"{share(seen, rest):>8.2f}{turn:>7.1f}{lean_deg:>7.1f}")
 
 
 def in_picture(truth, places_m, foot_px):
     """True places in the film against the foot that was found, px, y up."""
     camera, places_m = truth["camera"], np.array(places_m)
     scale, (x, y) = camera["px_per_m_at_z0"], camera["center_xy"]
+    places_m = places_m[:, :2] @ rotation(-camera.get("roll_deg", 0.0))
     u = truth["width"] / 2 - 0.5 + scale * (places_m[:, 0] - x)
     v = truth["height"] / 2 - 0.5 - scale * (places_m[:, 1] - y)
     return np.stack([u - foot_px[0], foot_px[1] - v], axis=-1)
@@ -85,10 +86,15 @@ def in_picture(truth, places_m, foot_px):
 
 def project(fit, places):
     """Places of the scan in the picture by what the command has found, px, y up."""
-    turn, roll = np.radians(fit["turn_deg"]), np.radians(fit["roll_deg"])
+    turn = np.radians(fit["turn_deg"])
     flat = np.stack([places[:, 0] * np.cos(turn) + places[:, 1] * np.sin(turn), places[:, 2]], axis=-1)
-    rolled = flat @ np.array([[np.cos(roll), np.sin(roll)], [-np.sin(roll), np.cos(roll)]])
-    return fit["px_per_metre"] * rolled + np.array(fit["shift_px"])
+    return fit["px_per_metre"] * flat @ rotation(fit["roll_deg"]) + np.array(fit["shift_px"])
+
+
+def rotation(degrees):
+    """Turns rows of places by this, anticlockwise."""
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[cos, sin], [-sin, cos]])
 
 
 def best_turn(places, rest):

@@ -27,6 +27,7 @@ class Camera:
     """Orthographic."""
     px_per_m: float
     centre_m: tuple
+    roll_deg: float = 0.0  # of the tree in the picture, clockwise, about the foot
 
     @staticmethod
     def framing(rng, points_m):
@@ -36,8 +37,10 @@ class Camera:
         return Camera(float(scale), (float(rng.uniform(-0.8, 0.8)), float((FOOT_V_PX - HEIGHT / 2 + 0.5) / scale)))
 
     def project(self, points_m):
-        u = WIDTH / 2 - 0.5 + self.px_per_m * (points_m[..., 0] - self.centre_m[0])
-        v = HEIGHT / 2 - 0.5 - self.px_per_m * (points_m[..., 1] - self.centre_m[1])
+        cos, sin = np.cos(np.radians(self.roll_deg)), np.sin(np.radians(self.roll_deg))
+        across, up = points_m[..., 0], points_m[..., 1]
+        u = WIDTH / 2 - 0.5 + self.px_per_m * (cos * across + sin * up - self.centre_m[0])
+        v = HEIGHT / 2 - 0.5 - self.px_per_m * (cos * up - sin * across - self.centre_m[1])
         return np.stack([u, v], axis=-1)
 
 

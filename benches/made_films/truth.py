@@ -97,7 +97,8 @@ def of_camera(camera):
         return dict(type="pinhole", centre_xy=rounded(camera.centre_m), focal_px=camera.as_file()["fx"], distance=rounded(camera.distance),
                     real_metres=float(camera.shrink), px_per_m_at_z0=rounded(camera.px_per_m),
                     projection="s=focal_px/(distance-z); u=W/2-.5+s*(x-cx); v=H/2-.5-s*(y-cy); depth=(distance-z)*real_metres")
-    return dict(type="ortho", center_xy=rounded(camera.centre_m), px_per_m_at_z0=rounded(camera.px_per_m), distance_m=45.0,
+    rolled = dict(roll_deg=camera.roll_deg) if camera.roll_deg else {}
+    return rolled | dict(type="ortho", center_xy=rounded(camera.centre_m), px_per_m_at_z0=rounded(camera.px_per_m), distance_m=45.0,
                 focal_px=None, projection="u=W/2-.5+s*(x-cx); v=H/2-.5-s*(y-cy); s=px_per_m_at_z0")
 
 

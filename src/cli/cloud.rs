@@ -8,6 +8,7 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
+use crate::bounds::Bounds;
 use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud};
 use crate::config::Config;
 use crate::document::Document;
@@ -16,7 +17,9 @@ use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_c
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
-use crate::views::{DrawnTree, FilmFit, FilmOnScan, register_film, scan_defaults, sway_on_scan};
+use crate::views::{
+    DrawnTree, FilmFit, FilmOnScan, FilmedPoint, register_film, scan_defaults, sway_on_scan,
+};
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
 use nalgebra::{Point3, Vector3};
@@ -319,7 +322,20 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let sway = sway_on_scan(&document.skeleton, metres_per_px, &film, &fit.registration);
+        let window_s = film.note.config.dynamics.window_s;
+        let points = film.tracked_within(window_s, Bounds::new(0.0, f64::INFINITY))?;
+        let mut filmed = Vec::with_capacity(points.tracks.len());
+        for track in &points.tracks {
+            let node = track.node;
+            filmed.extend(track.middle_px().map(|at_px| FilmedPoint { node, at_px }));
+        }
+        let sway = sway_on_scan(
+            &document.skeleton,
+            metres_per_px,
+            &film,
+            &filmed,
+            &fit.registration,
+        );
         Ok(Some(FilmOnScan { fit, sway }))
     }
 }

@@ -7,6 +7,7 @@
 //! McKay 1992; the nearest are looked for in place and direction). There is an answer only if lines
 //! lie near each other, and clearly nearer than from any other side.
 
+use super::lines::{LinePlace, WoodPiece, places_seen, thickest};
 use crate::signal::{CommonMotion, Pair};
 use nalgebra::{Point2, Point3, Similarity2, UnitComplex, Vector2};
 use std::f64::consts::TAU;
@@ -39,14 +40,6 @@ const LEAST_CONTRAST: f64 = 1.15;
 /// Pairs of places are missed by no more than this share of the height.
 const LARGEST_PAIR_MISS: f64 = 0.03;
 
-/// A straight piece of wood.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WoodPiece<P> {
-    pub from: P,
-    pub to: P,
-    pub radius: f64,
-}
-
 /// The same place in the film and in the scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlacePair {
@@ -74,6 +67,12 @@ impl Registration {
     /// A place of the scan in the picture, px, y up.
     pub fn project(&self, at: &Point3<f64>) -> Point2<f64> {
         self.to_picture * turned(at, self.turn)
+    }
+
+    /// How far a place of the scan is behind the foot as the camera sees it, px.
+    pub fn depth_px(&self, at: &Point3<f64>) -> f64 {
+        let (sin, cos) = self.turn.sin_cos();
+        self.to_picture.scaling() * (at.y * cos - at.x * sin)
     }
 
     /// Whether it holds: it misses by little, and no other side of the tree fits nearly as well.
@@ -154,15 +153,6 @@ fn least_squares(pairs: &[Pair]) -> Option<Similarity2<f64>> {
     Some(Similarity2::from_parts(shift.into(), turn, scale))
 }
 
-/// A place on a line, and the direction of the line, of length 1.
-#[derive(Clone, Copy, Debug)]
-struct Sample<P, V> {
-    at: P,
-    along: V,
-}
-
-type FilmSample = Sample<Point2<f64>, Vector2<f64>>;
-
 /// The registration by lines: `film` in the picture, px, y up, the foot at the origin; `scan` in
 /// space, m, z up, the foot at the origin. `None` where there is nothing to compare; else it is to
 /// be asked whether it [`holds`](Registration::holds).
@@ -181,12 +171,16 @@ pub fn by_lines(
     if height_px <= 0.0 || height <= 0.0 {
         return None;
     }
-    let length_px: f64 = film.iter().map(|p| (p.to - p.from).norm()).sum();
+    let length_px: f64 = film.iter().map(WoodPiece::length).sum();
     let start = height_px / height;
     let scan = thickest(scan, SCAN_LENGTHS * length_px / start);
     let [lines, fine] = SAMPLES_IN_HEIGHT.map(|samples| Lines {
-        film: film_samples(film, height_px / samples),
-        scan: scan_samples(&scan, height / samples),
+        film: film
+            .iter()
+            .flat_map(|p| p.cut(height_px / samples))
+            .map(|part| part.place())
+            .collect(),
+        scan: scan.iter().flat_map(|p| p.cut(height / samples)).collect(),
         height_px,
         start,
     });
@@ -224,52 +218,9 @@ fn apart(a: f64, b: f64) -> f64 {
     off.min(TAU - off)
 }
 
-/// The thickest pieces, so many metres together.
-fn thickest(scan: &[WoodPiece<Point3<f64>>], length: f64) -> Vec<WoodPiece<Point3<f64>>> {
-    let mut sorted = scan.to_vec();
-    sorted.sort_by(|a, b| b.radius.total_cmp(&a.radius));
-    let mut left = length;
-    sorted.retain(|p| {
-        left -= (p.to - p.from).norm();
-        left > 0.0
-    });
-    sorted
-}
-
-fn film_samples(pieces: &[WoodPiece<Point2<f64>>], step: f64) -> Vec<FilmSample> {
-    let mut samples = Vec::new();
-    for piece in pieces {
-        let way = piece.to - piece.from;
-        let count = (way.norm() / step).ceil() as usize;
-        let along = way.try_normalize(1e-9).unwrap_or_else(Vector2::y);
-        samples.extend((0..count).map(|k| Sample {
-            at: piece.from + way * ((k as f64 + 0.5) / count as f64),
-            along,
-        }));
-    }
-    samples
-}
-
-fn scan_samples(pieces: &[WoodPiece<Point3<f64>>], step: f64) -> Vec<WoodPiece<Point3<f64>>> {
-    let mut samples = Vec::new();
-    for piece in pieces {
-        let way = piece.to - piece.from;
-        let count = (way.norm() / step).ceil().max(1.0) as usize;
-        for k in 0..count {
-            let [from, to] = [k, k + 1].map(|k| piece.from + way * (k as f64 / count as f64));
-            samples.push(WoodPiece {
-                from,
-                to,
-                radius: piece.radius,
-            });
-        }
-    }
-    samples
-}
-
 /// The lines of both.
 struct Lines {
-    film: Vec<FilmSample>,
+    film: Vec<LinePlace>,
     /// Short pieces.
     scan: Vec<WoodPiece<Point3<f64>>>,
     height_px: f64,
@@ -311,63 +262,44 @@ impl Lines {
         })
     }
 
-    /// The film's samples with the nearest of the scan, and the other way round, without those
+    /// The film's places with the nearest of the scan, and the other way round, without those
     /// farthest off.
     fn matches(&self, turn: f64, to_picture: &Similarity2<f64>) -> Vec<Match> {
-        let mut scan: Vec<FilmSample> = Vec::with_capacity(self.scan.len());
-        for piece in &self.scan {
-            let [from, to] = [piece.from, piece.to].map(|end| to_picture * turned(&end, turn));
-            let along = (to - from).try_normalize(1e-9).unwrap_or_else(Vector2::y);
-            scan.push(Sample {
-                at: nalgebra::center(&from, &to),
-                along,
-            });
-        }
+        let scan = places_seen(&self.scan, |at| to_picture * turned(at, turn));
+        let mut matches = self.nearest(&self.film, &scan, FILM_SHARE);
+        let of_scan = self.nearest(&scan, &self.film, SCAN_SHARE);
+        matches.extend(of_scan.into_iter().map(Match::turned_round));
+        matches
+    }
+
+    /// For each of some places the nearest of others; only this share of them, the nearest.
+    fn nearest(&self, places: &[LinePlace], others: &[LinePlace], share: f64) -> Vec<Match> {
         let across = ACROSS_SHARE * self.height_px;
-        let mut matches = nearest(&self.film, &scan, across, FILM_SHARE, |film, scan| Pair {
-            from_px: scan,
-            to_px: film,
-        });
-        matches.extend(nearest(
-            &scan,
-            &self.film,
-            across,
-            SCAN_SHARE,
-            |scan, film| Pair {
-                from_px: scan,
-                to_px: film,
-            },
-        ));
+        let mut matches = Vec::with_capacity(places.len());
+        for own in places {
+            if let Some(nearest) = own.nearest_of(others, across) {
+                let pair = Pair {
+                    from_px: others[nearest.place].at,
+                    to_px: own.at,
+                };
+                let off = nearest.off;
+                matches.push(Match { pair, off });
+            }
+        }
+        matches.sort_by(|a, b| a.off.total_cmp(&b.off));
+        matches.truncate((share * places.len() as f64).ceil() as usize);
         matches
     }
 }
 
-/// For each of some samples the nearest of others; only this share of them, the nearest.
-fn nearest(
-    samples: &[FilmSample],
-    others: &[FilmSample],
-    across: f64,
-    share: f64,
-    pair: fn(Point2<f64>, Point2<f64>) -> Pair,
-) -> Vec<Match> {
-    let mut matches = Vec::with_capacity(samples.len());
-    for own in samples {
-        let mut best = (f64::INFINITY, own.at);
-        for other in others {
-            let turn = own.along.perp(&other.along);
-            let square = (other.at - own.at).norm_squared() + across * across * turn * turn;
-            if square < best.0 {
-                best = (square, other.at);
-            }
-        }
-        matches.push(Match {
-            pair: pair(own.at, best.1),
-            off: best.0.sqrt(),
-        });
+impl Match {
+    fn turned_round(self) -> Self {
+        let pair = Pair {
+            from_px: self.pair.to_px,
+            to_px: self.pair.from_px,
+        };
+        Self { pair, ..self }
     }
-    matches.sort_by(|a, b| a.off.total_cmp(&b.off));
-    matches.truncate((share * samples.len() as f64).ceil() as usize);
-    matches
 }
 
 #[cfg(test)]

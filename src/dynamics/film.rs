@@ -2,6 +2,7 @@
 
 use super::members::mean_px;
 use crate::model::{LogWindow, NodeId, Skeleton, TrackId};
+use crate::signal::statistics::median_vector;
 use crate::signal::statistics::nth_smallest;
 use nalgebra::Point2;
 use std::borrow::Cow;
@@ -21,6 +22,13 @@ pub struct FilmTrack {
 }
 
 impl FilmTrack {
+    /// The middle of its motion, px; `None` where it was never seen.
+    pub fn middle_px(&self) -> Option<Point2<f64>> {
+        let seen = self.at_px.iter().filter(|at| at.x.is_finite());
+        seen.clone().next()?;
+        Some(median_vector(seen.map(|at| at.coords)).into())
+    }
+
     /// Some of the frames; not seen in those that it does not have.
     fn in_frames(&self, frames: &[usize]) -> Self {
         let mut at_px = Vec::with_capacity(frames.len());

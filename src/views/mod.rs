@@ -5,6 +5,7 @@
 mod drawn;
 mod error;
 mod film_fit;
+mod film_lines;
 mod forest;
 mod forest_plan;
 mod forest_studio;
@@ -19,6 +20,7 @@ mod scan_film;
 mod scan_forest;
 mod scanned;
 mod studio;
+mod sway_on_scan;
 mod tables;
 mod write;
 
@@ -39,9 +41,10 @@ pub use photo::{
 #[cfg(feature = "opencv")]
 pub use photo_forest::{StandingPlaces, photo_forest};
 pub use prepared::{PreparedTree, TreeOptions};
-pub use scan_film::{register_film, sway_on_scan};
+pub use scan_film::register_film;
 pub use scan_forest::{StandingTree, scan_forest};
 pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
+pub use sway_on_scan::{FilmedPoint, sway_on_scan};
 pub use tables::TablesWritten;
 pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};
