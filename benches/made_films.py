@@ -22,6 +22,7 @@ Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
+--tag hangs a printed tag beside the tree, which stands still whatever its background does.
 --bad makes a film hard, and may be given several times. The tree and its motion are those of the seed without it, and all
 truth is that of the camera and the tree at the beginning of the film:
 BAD_KINDS
@@ -39,7 +40,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from made_films import bad_input, depth, markers, motion, picture, scenery, surface, tree, truth
+from made_films import bad_input, depth, markers, motion, picture, scenery, surface, tag, tree, truth
 
 DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
@@ -57,6 +58,7 @@ def main():
     parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
     parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
     parser.add_argument("--depth", action="store_true", help="a depth camera films it, in real metres")
+    parser.add_argument("--tag", action="store_true", help="a tag of 0.16 m hangs beside the tree")
     parser.add_argument("--force", type=float, default=1.0, help="times as strong a pull")
     parser.add_argument("--roll", type=float, default=0.0, metavar="DEG", help="the camera is rolled: the tree leans to the right in the picture")
     parser.add_argument("--rope-at", type=int, metavar="BRANCH", help="the rope is on this branch (its id in truth.json): it and what "
@@ -65,10 +67,10 @@ def main():
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
     rope = tree.Rope(args.rope_at, args.force)
     make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers,
-         args.depth, rope, args.roll)
+         args.depth, rope, args.roll, args.tag)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None, roll_deg=0.0):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None, roll_deg=0.0, has_tag=False):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
     if rope:
@@ -83,6 +85,7 @@ def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=Fa
     background = scenery.scenery(rng, leafy, picture.WIDTH, picture.HEIGHT)
     bad.set_up(seed, background, skin, camera, frames)
 
+    bad.tag_px = tag.place(picture.reach_px(pose, camera)) if has_tag else None
     hidden = bad.hides()
     put_on = markers.put_on(n_markers, branches, pose, camera, skin, frames, hidden)
     skin = surface.join([skin, *(m.skin for m in put_on)])
@@ -106,6 +109,7 @@ def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=Fa
     film = dict(clip=folder.name, renderer="benches/made_films.py", tree=f"made up, seed {seed}", fps=float(picture.FPS),
                 width=picture.WIDTH, height=picture.HEIGHT, n_frames=frames, coordinates=truth.COORDINATES,
                 camera=truth.of_camera(camera), motion=drive, bad_input=bad_kinds,
+                camera_shift_px=[truth.rounded(bad.moves.shift_px(f / picture.FPS)) for f in range(frames)],
                 branches=truth.of_branches(branches, pose, camera, branch, facts))
 
     folder.mkdir(parents=True, exist_ok=True)

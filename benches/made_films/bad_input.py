@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import cv2
 import numpy as np
 
-from . import bad_camera, motion, picture, scenery, surface, tree, walker
+from . import bad_camera, motion, picture, scenery, surface, tag, tree, walker
 from .picture import FINE, FPS, HEIGHT, WIDTH
 
 KINDS = {
@@ -25,12 +25,14 @@ KINDS = {
     "calm": "a tree that stands still",
     "walker": "a person who walks through in front of the tree, and back",
     "exposure": "an exposure that the camera changes all the time",
+    "drift": "all that stands behind the tree goes slowly to the right, as clouds do",
     "banding": "bands of light and dark that roll through the picture, as lamps on the mains make them",
     **bad_camera.KINDS,
 }
 # Each kind's chance is by its place in this list, so that a new kind, at its end, changes no film of another.
 WITH_CHANCE = ["brown_wall", "fence", "fog", "full_foliage", "night", "second_tree", "shadow", "wire", "no_background", "walker",
                "exposure", "hand_held"]
+DRIFT_PX_S = 2.0
 EXPOSURE_DEPTH, BAND_DEPTH, BAND_HZ, BANDS = 0.35, 0.25, 2.1, 1.5
 SHADE_LEAST, SHADE_PX_S, SHADE_SWAY_PX, SHADE_SWAY_HZ = 0.5, 12.0, 25.0, 0.35
 CROWN_LEAVES, TRUNK_LEAVES = 5000, 1500
@@ -56,6 +58,7 @@ class BadInput:
     walks: walker.Walker = None
     exposure_hz: float = 0.0
     moves: bad_camera.Moves = None
+    tag_px: np.ndarray = None  # the upper left corner of a tag
 
     def more_leaves(self, seed, branches, pose, skin):
         if "full_foliage" not in self.kinds:
@@ -97,7 +100,17 @@ class BadInput:
 
     def reaches_everywhere(self):
         """Whether more of the picture changes than where trees are."""
-        return self.walks is not None or "no_tree" in self.kinds
+        return self.walks is not None or "no_tree" in self.kinds or "drift" in self.kinds
+
+    def backdrop(self, background, time_s):
+        """What is behind the tree at a time; what goes out of the picture comes in as its mirror image."""
+        if "drift" in self.kinds:
+            warp = np.float32([[1, 0, DRIFT_PX_S * time_s], [0, 1, 0]])
+            background = cv2.warpAffine(background, warp, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+        if self.tag_px is not None:
+            background = background.copy()
+            tag.paint(background, self.tag_px)
+        return background
 
     def before_tree(self, canvas, time_s=None):
         """Draws what hangs in front on the fine canvas, and at a time who walks there."""

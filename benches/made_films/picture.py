@@ -92,6 +92,7 @@ def film(path, rng, background, surface, pose, camera, frames, bad_input, depth_
     """Write the film, or with a depth camera its images. Only the part of the picture that a tree ever reaches is drawn anew in each frame."""
     trees = [(t.skin, t.pose, t.camera) for t in bad_input.trees(surface, pose, camera)]
     colours = [[tuple(map(float, c)) for c in np.clip(skin.colour, 0, 255)] for skin, _, _ in trees]
+    behind, background = background, bad_input.backdrop(background, 0.0)
     clean, out = fine_canvas(background), Film(path, rng)
     image = np.clip(background, 0, 255).astype(np.float32)
     if bad_input.wires:
@@ -105,6 +106,8 @@ def film(path, rng, background, surface, pose, camera, frames, bad_input, depth_
     x1, y1 = np.max([high for _, high in reaches], axis=0)
     box = np.s_[FINE * y0 : FINE * y1, FINE * x0 : FINE * x1]
     for f in range(frames):
+        if "drift" in bad_input.kinds:
+            clean = fine_canvas(bad_input.backdrop(behind, f / FPS))
         canvas[box] = clean[box]
         for (skin, pose, camera), colour in zip(trees, colours):
             draw(canvas, skin, bad_input.moves.vertices_m(skin, pose, camera, f), camera, colour)

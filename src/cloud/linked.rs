@@ -41,7 +41,7 @@ impl Linked {
     }
 
     /// The same with the gaps of a single tree led over.
-    pub fn as_one_tree(self, standing: &Standing) -> Self {
+    pub fn into_one_tree(self, standing: &Standing) -> Self {
         self.bridged(GAP_SHARE * standing.height)
     }
 

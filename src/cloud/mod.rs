@@ -128,7 +128,7 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
         for (point, thinned) in standing.of_cloud.iter().zip(&coarse.thinned.of_point) {
             found.tree_of_point[*point as usize] = (*thinned != u32::MAX).then_some(0);
         }
-        let linked = coarse.as_one_tree(&standing);
+        let linked = coarse.into_one_tree(&standing);
         found
             .trees
             .push(tree_of(&standing, linked, options, figures));

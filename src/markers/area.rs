@@ -1,5 +1,6 @@
 //! Rectangles of whole pixels.
 
+use crate::config::MarkerWindow;
 use crate::model::Size;
 use nalgebra::{Point2, Vector2};
 
@@ -14,6 +15,17 @@ pub struct PixelArea {
 }
 
 impl PixelArea {
+    /// The window that a user gave, in whole pixels.
+    pub fn of_window(given: &MarkerWindow) -> Self {
+        let [u, v, width, height] = given.window_px.map(|side| side.round() as i32);
+        Self {
+            u,
+            v,
+            width,
+            height,
+        }
+    }
+
     /// The area of about this size around a place, px.
     pub fn around(middle_px: Point2<f64>, size_px: Vector2<f64>) -> Self {
         let size = size_px.map(|side| side.round().max(1.0));
@@ -36,6 +48,11 @@ impl PixelArea {
     /// Width and height, px.
     pub fn size_px(&self) -> Vector2<f64> {
         Vector2::new(f64::from(self.width), f64::from(self.height))
+    }
+
+    /// It, larger by so many of its own sizes on each side.
+    pub fn grown(&self, by: f64) -> Self {
+        Self::around(self.middle_px(), (1.0 + 2.0 * by) * self.size_px())
     }
 
     /// The part that lies in a picture of this size; `None` where there is none.

@@ -3,7 +3,7 @@
 use super::area::PixelArea;
 use crate::config::Markers;
 use crate::model::{Rgb, Size};
-use nalgebra::{Point2, Vector2};
+use nalgebra::{Point2, Vector2, distance};
 use opencv::core::{CV_8UC1, CV_32FC1, Mat, Scalar, Vector, in_range};
 use opencv::imgproc::{COLOR_RGB2HSV, calc_back_project, calc_hist, cvt_color_def};
 use opencv::prelude::*;
@@ -74,7 +74,7 @@ pub struct HueModel {
 
 impl HueModel {
     /// Of the pixels in the ellipse of half the size of `window`, in its middle: what is at the rim of a
-    /// window is not the marker. What is in none of the windows of `markers` is the rest of the
+    /// window is not the marker. `elsewhere` is the share of each bin of hues in the rest of the
     /// picture. `None` where nearly no pixel has a hue.
     ///
     /// # Errors
@@ -82,7 +82,7 @@ impl HueModel {
     pub fn of(
         hsv: &Hsv,
         window: &PixelArea,
-        markers: &[PixelArea],
+        elsewhere: &[f32],
         settings: &Markers,
     ) -> opencv::Result<Option<Self>> {
         let middle = PixelArea::around(window.middle_px(), 0.5 * window.size_px());
@@ -104,8 +104,7 @@ impl HueModel {
             return Ok(None);
         }
         let own = hue_shares(&pixels, &coloured, settings, n_inside)?;
-        let elsewhere = hues_elsewhere(hsv, markers, settings)?;
-        let mut bins: Vec<f32> = own.iter().zip(&elsewhere).map(by_hue).collect();
+        let mut bins: Vec<f32> = own.iter().zip(elsewhere).map(by_hue).collect();
         let most = bins.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
         bins.iter_mut().for_each(|bin| *bin *= 255.0 / most);
         Ok(Some(Self {
@@ -158,8 +157,16 @@ fn by_hue((own, elsewhere): (&f32, &f32)) -> f32 {
     own * marker / (marker + rest)
 }
 
-/// Of the pixels outside of these areas the share of each bin of hues; the rest has no hue.
-fn hues_elsewhere(hsv: &Hsv, areas: &[PixelArea], settings: &Markers) -> opencv::Result<Vec<f32>> {
+/// Of the pixels outside of these areas, where the markers are, the share of each bin of hues; the rest
+/// has no hue.
+///
+/// # Errors
+/// OpenCV fails.
+pub fn hues_elsewhere(
+    hsv: &Hsv,
+    areas: &[PixelArea],
+    settings: &Markers,
+) -> opencv::Result<Vec<f32>> {
     let (rows, cols) = (hsv.size.height as i32, 3 * hsv.size.width as i32);
     let flat = Mat::new_rows_cols_with_data(rows, cols, hsv.pixels())?;
     let pixels = flat.reshape(3, rows)?;
@@ -297,6 +304,11 @@ pub struct Blob {
 }
 
 impl Blob {
+    /// Whether its middle is that of another one: they are nearer than the radius of the larger.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        distance(&self.at_px, &other.at_px) < self.radius_px().max(other.radius_px())
+    }
+
     /// The radius of a disc of this size, px.
     pub fn radius_px(&self) -> f64 {
         (self.mass_px / std::f64::consts::PI).sqrt()

@@ -8,9 +8,11 @@
 
 mod area;
 mod blobs;
+mod claims;
 mod error;
 mod follow;
 mod hue;
+mod marker;
 mod search;
 mod shift;
 mod way;

@@ -1,8 +1,9 @@
 //! Markers that are not where they were: looked for where they may be.
 
 use super::area::PixelArea;
-use super::follow::{LEAST_SEEN, Marker, Sighting};
+use super::follow::LEAST_SEEN;
 use super::hue::{Blob, Hsv, Likelihood};
+use super::marker::{Marker, Sighting};
 use super::shift::shifted;
 use crate::config::MarkerMethod;
 use nalgebra::{Point2, Vector2, center, distance};

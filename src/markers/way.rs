@@ -27,6 +27,8 @@ pub struct Way {
     at_px: Point2<f64>,
     speed_px_s: Vector2<f64>,
     seen_s: f64,
+    /// Frames since then.
+    missed: u32,
     /// Between two frames.
     interval_s: Option<f64>,
     /// Mean square distance of a sight from where it was expected.
@@ -48,6 +50,7 @@ impl Way {
             at_px,
             speed_px_s: Vector2::zeros(),
             seen_s: time_s,
+            missed: 0,
             interval_s: None,
             surprise_px2: radius_px * radius_px,
             low_px: at_px,
@@ -58,11 +61,31 @@ impl Way {
         }
     }
 
-    /// It is seen in the next frame after `missed` frames without it.
-    pub fn see(&mut self, at_px: Point2<f64>, time_s: f64, missed: u32) {
+    /// Where it was when it was seen last, px.
+    pub fn at_px(&self) -> Point2<f64> {
+        self.at_px
+    }
+
+    /// When it was seen last, s.
+    pub fn seen_s(&self) -> f64 {
+        self.seen_s
+    }
+
+    /// Whether it was seen in the last frame.
+    pub fn is_seen(&self) -> bool {
+        self.missed == 0
+    }
+
+    /// It is not seen in the next frame.
+    pub fn miss(&mut self) {
+        self.missed = self.missed.saturating_add(1);
+    }
+
+    /// It is seen in the next frame.
+    pub fn see(&mut self, at_px: Point2<f64>, time_s: f64) {
         let off = at_px - self.straight_on(time_s);
         let passed_s = time_s - self.seen_s;
-        if missed == 0 && passed_s > 0.0 {
+        if self.is_seen() && passed_s > 0.0 {
             self.at_px = at_px - (1.0 - PLACE_GAIN) * off;
             self.speed_px_s += SPEED_GAIN / passed_s * off;
             self.surprise_px2 += SURPRISE_SHARE * (off.norm_squared() - self.surprise_px2);
@@ -73,7 +96,7 @@ impl Way {
             // Its speed is not known.
             self.surprise_px2 = self.surprise_px2.max(self.radius_px * self.radius_px);
         }
-        self.seen_s = time_s;
+        (self.seen_s, self.missed) = (time_s, 0);
         self.low_px = self.low_px.inf(&at_px);
         self.high_px = self.high_px.sup(&at_px);
         self.sum_px += at_px.coords;
@@ -168,7 +191,7 @@ mod tests {
         for frame in 1..frames {
             let time_s = f64::from(frame) * FRAME_S;
             assert!(way.may_be_at(sway_px(frame), time_s), "frame {frame}");
-            way.see(sway_px(frame), time_s, 0);
+            way.see(sway_px(frame), time_s);
         }
         way
     }

@@ -8,6 +8,7 @@ use crate::depth::{DepthGate, DepthReader};
 use crate::markers::{MarkerError, MarkerEvent, MarkerPlace};
 use crate::model::{DepthImage, Frame, Luma, Outline, Size, TrackSet};
 use crate::outline::{AutoOutline, Found};
+use crate::tag::Tag;
 use crate::track::{Tracker, WholeView};
 use nalgebra::Point2;
 use std::collections::VecDeque;
@@ -74,7 +75,7 @@ impl FrontEnd {
                 None => self.search_in(&frame),
             }
         }
-        self.tag.step(&frame);
+        let tag = self.tag.step(&frame);
         let depth = frame.depth.clone();
         let depths = MarkerDepths {
             gate: &self.depth_gate,
@@ -84,7 +85,11 @@ impl FrontEnd {
         };
         let region = self.given.as_deref();
         let markers = self.markers.step(&mut frame, region, &depths);
-        self.held.push_back(Held { frame, markers });
+        self.held.push_back(Held {
+            frame,
+            markers,
+            tag,
+        });
         if self.found.is_none() {
             while self.held.iter().map(Held::bytes).sum::<usize>() > HELD_BYTES {
                 self.held.pop_front();
@@ -193,8 +198,18 @@ impl FrontEnd {
 
     fn follow_next(&mut self) -> Option<Followed> {
         let (outline, tracker) = self.found.as_mut()?;
-        let Held { frame, markers } = self.held.pop_front()?;
+        let Held {
+            frame,
+            markers,
+            tag,
+        } = self.held.pop_front()?;
+        if let Some(tag) = tag.filter(|tag| hangs_beside(tag, outline)) {
+            tracker.see_tag(tag.corners_px);
+        }
         let mut tracks = tracker.step(&frame);
+        if let Some(off_px) = tracker.take_tag_dispute() {
+            self.tag.dispute(off_px);
+        }
         MarkerStage::join(&markers, &mut tracks);
         if let (Some(reader), Some(image)) = (&self.depth, &frame.depth) {
             look_up_depths(reader, image, frame.luma.size, &mut tracks);
@@ -211,6 +226,11 @@ impl FrontEnd {
     }
 }
 
+/// Whether a tag is beside the tree: one that hangs on it sways with it.
+fn hangs_beside(tag: &Tag, tree: &Outline) -> bool {
+    !tag.corners_px.iter().any(|at| tree.contains(at.x, at.y))
+}
+
 /// Gives the points of a frame their depth.
 fn look_up_depths(reader: &DepthReader, image: &DepthImage, picture: Size, tracks: &mut TrackSet) {
     let camera = tracks.camera;
@@ -219,10 +239,11 @@ fn look_up_depths(reader: &DepthReader, image: &DepthImage, picture: Size, track
     }
 }
 
-/// A frame that waits to be worked off, and the markers in it.
+/// A frame that waits to be worked off, and the markers and the tag in it.
 struct Held {
     frame: Frame,
     markers: Vec<MarkerPlace>,
+    tag: Option<Tag>,
 }
 
 impl Held {

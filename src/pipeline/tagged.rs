@@ -1,8 +1,8 @@
 //! A printed tag beside the trunk: frames to a scale.
 
-use crate::config::Tag;
+use crate::config;
 use crate::model::{Frame, TagScale};
-use crate::tag::{TagSeen, find_tags, scale_of};
+use crate::tag::{Tag, TagSeen, find_tags, scale_of};
 
 /// The scale is fixed after so many sights, in one of so many frames; from then on the tag is looked at in
 /// one of more frames, which tells whether the camera moves.
@@ -25,11 +25,13 @@ pub enum TagNews {
     Unseen(TagScale),
     /// There is none in the first frames.
     NoneSeen,
+    /// What stands around the tree moves against it, by so much, px.
+    Disputed(f64),
 }
 
 /// Looks for the tag, where there is one.
 pub(super) struct TagStage {
-    settings: Tag,
+    settings: config::Tag,
     sights: Vec<TagSeen>,
     frames: u64,
     scale: Option<TagScale>,
@@ -37,7 +39,7 @@ pub(super) struct TagStage {
 }
 
 impl TagStage {
-    pub fn new(settings: &Tag) -> Self {
+    pub fn new(settings: &config::Tag) -> Self {
         Self {
             settings: settings.clone(),
             sights: Vec::new(),
@@ -47,8 +49,8 @@ impl TagStage {
         }
     }
 
-    /// Looks for it in the next frame, if it is that one's turn.
-    pub fn step(&mut self, frame: &Frame) {
+    /// Looks for it in the next frame, if it is that one's turn; the tag if it is seen there.
+    pub fn step(&mut self, frame: &Frame) -> Option<Tag> {
         let every = if self.scale.is_some() {
             EVERY_THEN
         } else {
@@ -57,14 +59,16 @@ impl TagStage {
         let is_turn = self.frames.is_multiple_of(every);
         self.frames += 1;
         if self.settings.size_m <= 0.0 {
-            return;
+            return None;
         }
+        let mut in_frame = None;
         if is_turn && self.sights.len() < MAX_SIGHTS {
             let known = self.sights.first().map(|seen| seen.tag.id);
             let tags = find_tags(&frame.luma);
             let tag = tags.iter().find(|tag| known.is_none_or(|id| id == tag.id));
             let seen = tag.and_then(TagSeen::of);
             self.sights.extend(seen);
+            in_frame = seen.map(|seen| seen.tag);
             if let Some(fixed) = self.scale {
                 let known = self.with_all_sights(fixed);
                 self.news.push(match seen {
@@ -79,6 +83,12 @@ impl TagStage {
         if self.frames == FRAMES_WITHOUT && self.sights.is_empty() {
             self.news.push(TagNews::NoneSeen);
         }
+        in_frame
+    }
+
+    /// What stands around the tree moves against the tag, by so much, px.
+    pub fn dispute(&mut self, off_px: f64) {
+        self.news.push(TagNews::Disputed(off_px));
     }
 
     /// There are no more frames.

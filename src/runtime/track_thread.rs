@@ -278,6 +278,7 @@ impl<'a> TrackThread<'a> {
                 }
                 TagNews::Unseen(scale) => self.show_tag(scale, false),
                 TagNews::NoneSeen => self.shared.warn(NO_TAG.into()),
+                TagNews::Disputed(off_px) => self.shared.warn(dispute_line(off_px)),
             }
         }
         if let Some(markers) = self.front.take_new_markers() {
@@ -309,6 +310,14 @@ impl<'a> TrackThread<'a> {
             self.shared.fail(Failure::NothingDecoded(e.clone()));
         }
     }
+}
+
+/// The warning where the surroundings move against the tag.
+fn dispute_line(off_px: f64) -> String {
+    format!(
+        "what stands around the tree moves against the tag, by {off_px:.1} px so far: the camera's \
+         motion is that of the tag alone from here on; the tag must hang still"
+    )
 }
 
 /// What the user hears of a tag.

@@ -69,18 +69,44 @@ impl CommonMotion {
             right += weight * rows.transpose() * pair.to_px.coords;
         }
         let inverse = normal.cholesky()?.inverse();
-        let [a, b, c, d]: [f64; 4] = (inverse * right).into();
-        let scale = a.hypot(b);
-        if !(scale > 0.0 && scale.is_finite()) {
-            return None;
-        }
-        let rotation = UnitComplex::from_angle(b.atan2(a));
-        let shift = Vector2::new(c, d) - scale * (rotation * centre);
         Some(Self {
-            motion: Similarity2::from_parts(shift.into(), rotation, scale),
+            motion: motion_of(inverse * right, centre)?,
             sd_px,
             centre,
             covariance: inverse,
+        })
+    }
+
+    /// What two independent findings of one motion say together, each weighted by the inverse of its
+    /// covariance (Aitken 1935); `None` where one of them knows nothing.
+    pub fn with(&self, other: &Self) -> Option<Self> {
+        let (own, others) = (
+            self.about_centre(self.centre)?,
+            other.about_centre(self.centre)?,
+        );
+        let covariance = (own.information + others.information).cholesky()?.inverse();
+        let of_both = own.information * own.values + others.information * others.values;
+        Some(Self {
+            motion: motion_of(covariance * of_both, self.centre)?,
+            sd_px: 1.0,
+            centre: self.centre,
+            covariance,
+        })
+    }
+
+    /// a, b, c and d where places are counted from `centre`, and the inverse of their covariance.
+    fn about_centre(&self, centre: Vector2<f64>) -> Option<Informed> {
+        let Similarity2 { isometry, .. } = self.motion;
+        let (turn, scale) = (isometry.rotation, self.motion.scaling());
+        let shift = self.motion * Point2::from(centre);
+        let mut carried = Matrix4::identity();
+        carried
+            .fixed_view_mut::<2, 4>(2, 0)
+            .copy_from(&rows(centre - self.centre));
+        let covariance = carried * (self.sd_px.powi(2) * self.covariance) * carried.transpose();
+        Some(Informed {
+            values: Vector4::new(scale * turn.re, scale * turn.im, shift.x, shift.y),
+            information: covariance.cholesky()?.inverse(),
         })
     }
 
@@ -94,6 +120,24 @@ impl CommonMotion {
         }
         self.sd_px * worst.sqrt()
     }
+}
+
+/// a, b, c and d of a motion, and the inverse of their covariance.
+struct Informed {
+    values: Vector4<f64>,
+    information: Matrix4<f64>,
+}
+
+/// The motion of a, b, c and d where places are counted from `centre`, px.
+fn motion_of(values: Vector4<f64>, centre: Vector2<f64>) -> Option<Similarity2<f64>> {
+    let [a, b, c, d]: [f64; 4] = values.into();
+    let scale = a.hypot(b);
+    if !(scale > 0.0 && scale.is_finite()) {
+        return None;
+    }
+    let rotation = UnitComplex::from_angle(b.atan2(a));
+    let shift = Vector2::new(c, d) - scale * (rotation * centre);
+    Some(Similarity2::from_parts(shift.into(), rotation, scale))
 }
 
 /// Standard deviation of a place's coordinate about a motion, px, from the median.
@@ -115,4 +159,41 @@ pub fn sd_of_misses(misses: impl Iterator<Item = f64>) -> Option<f64> {
 /// What a, b, c, d do to the place `at`.
 fn rows(at: Vector2<f64>) -> Matrix2x4<f64> {
     Matrix2x4::new(at.x, -at.y, 1.0, 0.0, at.y, at.x, 0.0, 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Places on a grid of 8 by 4 about `middle_px`, so far apart, that are found to 0.05 px.
+    fn pairs(truth: &Similarity2<f64>, middle_px: Point2<f64>, apart_px: f64) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        for k in 0..32 {
+            let place = Vector2::new(f64::from(k % 8) - 3.5, f64::from(k / 8) - 1.5);
+            let from_px = middle_px + apart_px * place;
+            let angle = 2.4 * f64::from(k);
+            let to_px = truth * from_px + 0.05 * Vector2::new(angle.cos(), angle.sin());
+            pairs.push(Pair { from_px, to_px });
+        }
+        pairs
+    }
+
+    #[test]
+    fn two_findings_together_are_surer_than_each() {
+        let truth = Similarity2::new(Vector2::new(3.0, -1.5), 0.004, 1.002);
+        let near = CommonMotion::of(&pairs(&truth, Point2::new(80.0, 250.0), 5.0)).unwrap();
+        let wide = CommonMotion::of(&pairs(&truth, Point2::new(320.0, 180.0), 40.0)).unwrap();
+        let both = near.with(&wide).unwrap();
+        for place in [Point2::new(80.0, 250.0), Point2::new(500.0, 40.0)] {
+            let [alone, wide_alone, together] =
+                [&near, &wide, &both].map(|found| found.worst_sd_px(&[place]));
+            assert!(together < alone && together < wide_alone, "{place}");
+            let off_px = (both.motion * place - truth * place).norm();
+            assert!(off_px < 3.0 * together, "{place}: {off_px} of {together}");
+        }
+        // What is hardly known hardly counts.
+        let far = both.motion * Point2::new(500.0, 40.0);
+        let far_by_wide = wide.motion * Point2::new(500.0, 40.0);
+        assert!((far - far_by_wide).norm() < 0.02);
+    }
 }

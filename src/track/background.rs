@@ -3,10 +3,11 @@
 //! Corners outside of the outline are found again in every picture by their first patches; the
 //! similarity on which they agree is the camera's motion. Corners that move by themselves, leaves
 //! of a hedge or somebody who walks by, lose their weight. Where there are none, or they do not
-//! agree, the foot of the trunk serves.
+//! agree, a tag beside the tree serves, and without one the foot of the trunk.
 
 use super::flow::OpticalFlow;
 use super::landmarks::{CornerChoice, Landmarks, Pictures, clear_corners};
+use super::tag_marks::TagMarks;
 use super::trunk_foot::TrunkFoot;
 use crate::model::{self, CameraMotion, Luma, Outline, Size};
 use nalgebra::Point2;
@@ -47,6 +48,7 @@ const KNOWN: f64 = 0.8;
 pub struct Background {
     region: Region,
     landmarks: Landmarks,
+    tag: TagMarks,
     /// Serves where the background does not; `None` where there is no trunk to be seen.
     foot: Option<TrunkFoot>,
     /// Corners were looked for at this time, s; `None` before the first frame.
@@ -122,11 +124,23 @@ impl Background {
         Self {
             region,
             landmarks: Landmarks::default(),
+            tag: TagMarks::default(),
             foot: None,
             sought_s: None,
             motion: CameraMotion::default(),
             sight: Sight::default(),
         }
+    }
+
+    /// A tag that hangs beside the tree is seen with these corners, px, in the next picture.
+    pub fn see_tag(&mut self, corners_px: [Point2<f64>; 4]) {
+        self.tag.see(corners_px);
+    }
+
+    /// By how much the surroundings were off the tag, px, when they were found to move by themselves;
+    /// once.
+    pub fn take_dispute(&mut self) -> Option<f64> {
+        self.tag.take_dispute()
     }
 
     /// The camera's motion in the newest of the `pictures`.
@@ -139,9 +153,12 @@ impl Background {
         let was = self.motion;
         let before = was.filmed_from_steady;
         let places_px = &self.region.places_px;
-        let agreed = self.landmarks.follow(pictures, &before, places_px, flow);
+        let around = self.landmarks.follow(pictures, &before, places_px, flow);
+        let by_tag = self.tag.follow(pictures, &before, places_px, flow);
+        let is_worn = around.is_some_and(|around| around.is_worn);
+        let agreed = self.tag.judge(around, by_tag, luma.size, places_px);
         if let Some(agreed) = agreed {
-            self.motion.filmed_from_steady = agreed.filmed_from_steady;
+            self.motion.filmed_from_steady = agreed.common.motion;
         }
         let far_px = FAR * f64::from(luma.size.width);
         let is_far = self.motion.farthest_px(places_px) > far_px;
@@ -152,7 +169,7 @@ impl Background {
             (false, None) => model::Background::Unclear,
         };
         let is_due = self.sought_s.is_none_or(|s| time_s - s >= ANEW_S);
-        if is_due && agreed.is_some_and(|agreed| agreed.is_worn) {
+        if is_due && is_worn {
             self.seek(luma, time_s);
         }
         if self.motion.background == model::Background::Unclear
@@ -161,6 +178,7 @@ impl Background {
         {
             self.motion = by_foot;
         }
+        self.tag.take(luma, &self.motion.filmed_from_steady);
         self.motion
     }
 
@@ -168,10 +186,11 @@ impl Background {
     fn begin(&mut self, luma: &Luma, time_s: f64) {
         self.seek(luma, time_s);
         let has_foot = self.foot.as_mut().is_some_and(|foot| foot.begin(luma));
-        if self.landmarks.suffice() {
+        self.tag.take(luma, &self.motion.filmed_from_steady);
+        let shown_by = [&self.landmarks, self.tag.landmarks()];
+        if let Some(shows) = shown_by.into_iter().find(|by| by.suffice()) {
             self.sight.note(true, time_s);
-            let seen = model::Background::Seen(self.landmarks.at_first());
-            self.motion.background = seen;
+            self.motion.background = model::Background::Seen(shows.at_first());
         } else if let Some(foot) = self.foot.as_ref().filter(|_| has_foot) {
             self.motion.background = model::Background::Foot(foot.at_first());
         }
@@ -257,9 +276,48 @@ mod tests {
         }
     }
 
+    /// What is around the tree: a wall with or without structure, which goes to the right, and a tag.
+    #[derive(Clone, Copy, Default)]
+    struct Around {
+        has_structure: bool,
+        wall_px_s: f64,
+        has_tag: bool,
+    }
+
+    const CELL_PX: f64 = 6.0;
+    const TAG_PX: [Point2<f64>; 4] = [
+        Point2::new(24.0, 130.0),
+        Point2::new(72.0, 130.0),
+        Point2::new(72.0, 178.0),
+        Point2::new(24.0, 178.0),
+    ];
+
+    /// Ink or paper at a place of the tag, `None` beside it: cells as of a code, a black rim and paper.
+    fn tag_at(u: f64, v: f64) -> Option<f64> {
+        let column = ((u - TAG_PX[0].x) / CELL_PX).floor() as i32;
+        let row = ((v - TAG_PX[0].y) / CELL_PX).floor() as i32;
+        if !(-1..9).contains(&column) || !(-1..9).contains(&row) {
+            return None;
+        }
+        let is_inside = (0..8).contains(&column) && (0..8).contains(&row);
+        let is_code = (1..7).contains(&column) && (1..7).contains(&row);
+        let is_white = !is_inside || is_code && (5 * column * row + column + 3 * row) % 7 > 2;
+        Some(if is_white { 215.0 } else { 30.0 })
+    }
+
+    /// The tag as a pixel shows it.
+    fn tag_pixel(u: f64, v: f64) -> Option<f64> {
+        let mut sum = 0.0;
+        for k in 0..16 {
+            let off = [k % 4, k / 4].map(|i| (f64::from(i) + 0.5) / 4.0 - 0.5);
+            sum += tag_at(u + off[0], v + off[1])?;
+        }
+        Some(sum / 16.0)
+    }
+
     /// The picture of a camera that has moved by `shift`, of a tree that is turned about its foot by
-    /// `sway`, before a wall with or without structure.
-    fn picture(shift: [f64; 2], sway: f64, has_structure: bool) -> Luma {
+    /// `sway`, before a wall that has gone to the right by `wall_px`.
+    fn picture(shift: [f64; 2], sway: f64, around: Around, wall_px: f64) -> Luma {
         let mut pixels = Vec::with_capacity(SIZE.area());
         for i in 0..SIZE.area() {
             let u = (i % SIZE.width as usize) as f64 - shift[0];
@@ -273,26 +331,40 @@ mod tests {
             } else {
                 0.0
             };
-            let wall = 30.0 * ((0.31 * u).sin() * (0.27 * v).cos() + (0.13 * u * v / 40.0).sin());
-            let wall = 180.0 + f64::from(u8::from(has_structure)) * wall;
+            let w = u - wall_px;
+            let wall = 30.0 * ((0.31 * w).sin() * (0.27 * v).cos() + (0.13 * w * v / 40.0).sin());
+            let wall = 180.0 + f64::from(u8::from(around.has_structure)) * wall;
+            let tag = around.has_tag.then(|| tag_pixel(u, v)).flatten();
+            let wall = tag.unwrap_or(wall);
             let tree = (trunk * above).max(crown.clamp(0.0, 1.0));
             pixels.push((wall + tree * (bark - wall)).round().clamp(0.0, 255.0) as u8);
         }
         Luma { size: SIZE, pixels }
     }
 
-    /// The camera's motions in 60 frames, held against the truth: how many of these the background
-    /// showed, how many the foot, and by how much that was off at most, px.
-    fn followed(has_structure: bool, outline: &Outline) -> (usize, usize, f64) {
+    /// What was said of the camera's motions in 60 frames, held against the truth.
+    struct Followed {
+        /// Frames in which the background showed it, and in which the foot did.
+        seen: usize,
+        by_foot: usize,
+        /// By how much it was off at most, and in the last frame, px.
+        off_px: f64,
+        off_at_end_px: f64,
+        is_disputed: bool,
+    }
+
+    fn followed(around: Around, outline: &Outline) -> Followed {
         let settings = Track::default();
         let mut background = Background::around(outline);
         let mut flow = OpticalFlow::new(settings.window_px);
         let (mut previous, mut present) = (Pyramid::default(), Pyramid::default());
         let (mut seen, mut by_foot, mut off_px) = (0, 0, 0.0_f64);
+        let mut off_at_end_px = f64::INFINITY;
         for k in 0..60_u32 {
             let t = f64::from(k) / 30.0;
             let shift = [2.0 * (14.0 * t).sin(), 1.2 * (9.0 * t).sin()];
-            let luma = picture(shift, 0.03 * (5.0 * t).sin(), has_structure);
+            let sway = 0.03 * (5.0 * t).sin();
+            let luma = picture(shift, sway, around, around.wall_px_s * t);
             std::mem::swap(&mut previous, &mut present);
             present.rebuild(&luma, settings.window_px, settings.levels);
             let pictures = Pictures {
@@ -302,6 +374,9 @@ mod tests {
                 present: &present,
                 levels: settings.levels,
             };
+            if around.has_tag && k == 0 {
+                background.see_tag(TAG_PX);
+            }
             let motion = background.step(&pictures, &mut flow);
             match motion.background {
                 model::Background::Seen(_) => seen += 1,
@@ -309,19 +384,55 @@ mod tests {
                 model::Background::Unclear | model::Background::Lost => continue,
             }
             let moved = motion.filmed_px(FOOT) - FOOT;
-            off_px = off_px.max((moved.x - shift[0]).hypot(moved.y - shift[1]));
+            off_at_end_px = (moved.x - shift[0]).hypot(moved.y - shift[1]);
+            off_px = off_px.max(off_at_end_px);
         }
-        (seen, by_foot, off_px)
+        Followed {
+            seen,
+            by_foot,
+            off_px,
+            off_at_end_px,
+            is_disputed: background.take_dispute().is_some(),
+        }
     }
 
     #[test]
     fn the_foot_of_a_swaying_trunk_serves_where_the_background_is_plain() {
-        let (seen, by_foot, off_px) = followed(false, &outline());
-        assert_eq!((seen, by_foot), (0, 60));
-        assert!(off_px < 0.6, "{off_px}");
-        let (seen, by_foot, off_px) = followed(true, &outline());
-        assert_eq!((seen, by_foot), (60, 0));
-        assert!(off_px < 0.1, "{off_px}");
+        let plain = followed(Around::default(), &outline());
+        assert_eq!((plain.seen, plain.by_foot), (0, 60));
+        assert!(plain.off_px < 0.6, "{}", plain.off_px);
+        let structured = Around {
+            has_structure: true,
+            ..Around::default()
+        };
+        let wall = followed(structured, &outline());
+        assert_eq!((wall.seen, wall.by_foot), (60, 0));
+        assert!(wall.off_px < 0.1, "{}", wall.off_px);
+    }
+
+    #[test]
+    fn a_tag_serves_where_the_background_is_plain_or_moves() {
+        let tagged = Around {
+            has_tag: true,
+            ..Around::default()
+        };
+        let plain = followed(tagged, &outline());
+        assert_eq!((plain.seen, plain.is_disputed), (60, false));
+        assert!(plain.off_px < 0.3, "{}", plain.off_px);
+        let still = Around {
+            has_structure: true,
+            ..tagged
+        };
+        let still = followed(still, &outline());
+        assert_eq!((still.seen, still.is_disputed), (60, false));
+        assert!(still.off_px < 0.1, "{}", still.off_px);
+        let drifting = Around {
+            has_structure: true,
+            wall_px_s: 4.0,
+            ..tagged
+        };
+        let drifting = followed(drifting, &outline());
+        assert!(drifting.is_disputed && drifting.off_at_end_px < 0.3);
     }
 
     /// An outline that does not end at the foot holds nothing that stands still.
@@ -329,6 +440,6 @@ mod tests {
     fn a_crown_alone_says_nothing_of_the_camera() {
         let mut crown = outline();
         crown.mask[91 * SIZE.width as usize..].fill(0);
-        assert_eq!(followed(false, &crown).1, 0);
+        assert_eq!(followed(Around::default(), &crown).by_foot, 0);
     }
 }

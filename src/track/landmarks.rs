@@ -3,7 +3,7 @@
 
 use super::flow::{Flow, OpticalFlow, Pyramid};
 use super::register::{Patch, Registration};
-use crate::model::{Agreement, Luma};
+use crate::model::{Agreement, Luma, Size};
 use crate::signal::statistics::rms;
 use crate::signal::{CommonMotion, Pair};
 use nalgebra::{Point2, Similarity2, distance};
@@ -75,7 +75,7 @@ pub struct CornerChoice {
 /// A motion on which corners agree.
 #[derive(Clone, Copy, Debug)]
 pub struct Agreed {
-    pub filmed_from_steady: Similarity2<f64>,
+    pub common: CommonMotion,
     pub agreement: Agreement,
     /// So few of the corners are still found that new ones should be taken.
     pub is_worn: bool,
@@ -131,8 +131,7 @@ impl Landmarks {
                 pairs = self.find(luma, &jumped);
             }
         }
-        let agree_px = AGREE * f64::from(luma.size.width);
-        agreed(&pairs, sought, agree_px, places_px)
+        agreed(&pairs, sought, agree_px(luma.size), places_px)
     }
 
     /// Looks for every corner near where it is by `expected`.
@@ -191,10 +190,15 @@ impl Landmarks {
             }
         }
         // Where to look is known well enough within twice the reach of a patch.
-        let agree_px = 2.0 * AGREE * f64::from(luma.size.width);
+        let agree_px = 2.0 * agree_px(luma.size);
         let agreed = agreed(&pairs, self.corners.len(), agree_px, places_px)?;
-        Some(agreed.filmed_from_steady)
+        Some(agreed.common.motion)
     }
+}
+
+/// Corners agree on a motion that they miss by no more than this in a picture of this size, px.
+pub fn agree_px(size: Size) -> f64 {
+    AGREE * f64::from(size.width)
 }
 
 /// The clearest corners (Shi and Tomasi 1994) of a picture where `allowed` is not 0, px.
@@ -242,7 +246,7 @@ fn agreed(
     }
     let sd_px = common.worst_sd_px(places_px);
     (sd_px <= LARGEST_SD_PX).then_some(Agreed {
-        filmed_from_steady: common.motion,
+        common,
         agreement: Agreement {
             sd_px,
             inliers: n_agree as u32,
@@ -293,7 +297,7 @@ mod tests {
                 pair.to_px += 12.0 * own;
             }
             let found = agreed(&pairs, 150, 0.5, &PLACES).expect("most agree");
-            let off_px = PLACES.map(|at| (found.filmed_from_steady * at - truth * at).norm());
+            let off_px = PLACES.map(|at| (found.common.motion * at - truth * at).norm());
             let off_px = off_px[0].max(off_px[1]);
             assert!(off_px < 0.06, "{round}: {off_px}");
             within += u32::from(off_px < 2.5 * found.agreement.sd_px);

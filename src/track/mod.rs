@@ -14,6 +14,7 @@ mod neighbours;
 mod point;
 mod regain;
 mod register;
+mod tag_marks;
 mod template;
 mod trial;
 mod trunk_foot;
@@ -98,6 +99,18 @@ impl Tracker {
     /// The id that the next new point will get.
     pub fn next_id(&self) -> u32 {
         self.next_id
+    }
+
+    /// A tag that hangs beside the tree is seen with these corners, px, in the frame that is followed
+    /// next.
+    pub fn see_tag(&mut self, corners_px: [Point2<f64>; 4]) {
+        self.background.see_tag(corners_px);
+    }
+
+    /// By how much what stands around the tree was off the tag, px, when it was found to move by itself;
+    /// once.
+    pub fn take_tag_dispute(&mut self) -> Option<f64> {
+        self.background.take_dispute()
     }
 
     /// Follows all points into `frame` and replaces the lost ones.

@@ -138,7 +138,6 @@ impl FilmFit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point2;
 
     fn scan() -> Vec<WoodPiece<Point3<f64>>> {
         let stem = Point3::new(0.3, 0.1, 5.0);
