@@ -5,6 +5,7 @@ mod options;
 pub use options::{Kind, RenderArgs, ViewName, WHITE, background, rate, size};
 
 use super::command_error::CommandError;
+use super::output::eprint_line;
 use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
 use crate::document::ForestDocument;
@@ -41,12 +42,6 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
         return draw_forest(&forest, &args.shot(), kind, &args.out, &stop);
     }
     let tree = args.tree.prepare(&args.dir, tail(args, kind), |_| {})?;
-    if kind == Kind::Video && !args.shot().turntable && !tree.document.has_motion() {
-        return Err(CommandError::BadUsage(anyhow!(
-            "the tree is at rest, as no motion of it was filmed; `arborcam animate` lets it sway in a video, and \
-             --view turntable goes round it"
-        )));
-    }
     if args.film.is_some() && tree.document.picture.is_none() {
         return Err(CommandError::Failed(anyhow!(
             "the capture holds no frame of the film; leave --film out"
@@ -55,6 +50,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
     draw(&tree, &args.shot(), kind, &args.out, &stop)?;
     // Printed last: if there is an error, it is the only line.
     print_warnings(&tree);
+    if kind == Kind::Video && !args.shot().turntable && !tree.document.has_motion() {
+        eprint_line(
+            "arborcam: warning: nothing moves in the video, as no motion of the tree was filmed; `arborcam animate` \
+             lets it sway, and --view turntable goes round it",
+        );
+    }
     Ok(())
 }
 

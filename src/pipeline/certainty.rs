@@ -4,9 +4,9 @@ use crate::wood::SeenInPhotograph;
 
 /// A tree with less than this is more likely wrong than right.
 const LEAST_CHANCE: f64 = 0.5;
-/// No tree is said to be surer: of the 60 fresh pictures that were said to be surest, 51 were right.
+/// No tree is said to be surer: of 82 fresh pictures that were said to be surest 69 were right.
 const MOST_CHANCE: f64 = 0.85;
-/// No tree without colours is: trees are as often in leaf as not.
+/// Without colours none is said to be surer: of 43 grey pictures 12 were right.
 const MOST_GREY: f64 = 0.45;
 /// With this no other attempt is made.
 const SURE_CHANCE: f64 = 0.8;
