@@ -38,9 +38,12 @@ pub(super) fn stand(
     let foot = axis.at(ground_at(&foot).unwrap_or(base.z));
     let is_clear = |place: &Place| place.at.z >= axis.clear_from;
     let clear = trunk.places.iter().position(is_clear).unwrap_or(0).max(1);
-    let top = trunk.places[clear].at.z;
+    let top = trunk.places[clear].at;
+    // The axis is that of all clear places together: it goes over into the lowest of them without a kink.
+    let aside = top - axis.at(top.z);
     for (k, place) in trunk.places[..clear].iter_mut().enumerate() {
-        place.at = axis.at(foot.z + (top - foot.z) * k as f64 / clear as f64);
+        let share = k as f64 / clear as f64;
+        place.at = axis.at(foot.z + (top.z - foot.z) * share) + aside * share;
         place.measured = None;
     }
 }
