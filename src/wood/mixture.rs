@@ -22,6 +22,9 @@ const LEAST_SEEDS: usize = 64;
 /// Least density that is believed: a colour that was never seen.
 const LEAST_DENSITY: f64 = 1e-30;
 
+/// A colour that is so many squared deviations off a part has less than a thousandth of the least density there.
+const FARTHEST_SQUARES: f64 = 160.0;
+
 /// Rounds in which a mixture of any number of parts is learned.
 const ROUNDS: usize = 25;
 /// Rounds in which the groups that it begins at settle.
@@ -130,7 +133,12 @@ impl Normal {
     /// Without the factor that all mixtures have.
     fn density(&self, colour: &Vector3<f64>) -> f64 {
         let off = colour - self.mean;
-        self.height * (-0.5 * off.dot(&(self.precision * off))).exp()
+        let squares = off.dot(&(self.precision * off));
+        // Far below the least density that is believed.
+        if squares > FARTHEST_SQUARES {
+            return 0.0;
+        }
+        self.height * (-0.5 * squares).exp()
     }
 }
 
@@ -162,11 +170,15 @@ impl Mixture {
     /// mixture gives it.
     fn improved(&self, colours: &Colours, all: f64) -> Self {
         let mut sums = vec![Bin::default(); self.parts.len()];
+        let mut densities = vec![0.0; self.parts.len()];
         for bin in &colours.bins {
             let colour = bin.mean();
-            let of_all = self.density(&colour);
-            for (sum, part) in sums.iter_mut().zip(&self.parts) {
-                sum.add(bin, part.density(&colour) / of_all);
+            for (density, part) in densities.iter_mut().zip(&self.parts) {
+                *density = part.density(&colour);
+            }
+            let of_all = LEAST_DENSITY + densities.iter().sum::<f64>();
+            for (sum, density) in sums.iter_mut().zip(&densities) {
+                sum.add(bin, density / of_all);
             }
         }
         let sums = sums.iter();
