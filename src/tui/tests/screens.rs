@@ -2,7 +2,8 @@
 
 use super::made_up::{huge, snapshot};
 use crate::model::{
-    CameraState, Phase, Rgb, Size, Skeleton, Snapshot, Unidentified, WoodSight, reason,
+    CameraState, Phase, Rgb, Size, Skeleton, Snapshot, TagScale, TagState, Unidentified, WoodSight,
+    reason,
 };
 use crate::tui::compose;
 use crate::tui::drawing::{Drawing, Subject};
@@ -167,6 +168,32 @@ fn a_window_that_is_too_small_tells_a_key_that_ends() {
         let words: Vec<&str> = text.split_whitespace().collect();
         assert!(words.join(" ").contains("Ctrl-C ends"), "{screen}");
     }
+}
+
+/// The panel says the scale by a tag, and when the tag is not seen any more.
+#[test]
+fn a_tag_has_a_row_with_its_scale() {
+    let scale = TagScale {
+        id: 7,
+        size_m: 0.16,
+        frames: 12,
+        metres_per_px: 0.004,
+        metres_per_px_lo: 0.00396,
+        metres_per_px_hi: 0.00404,
+        roll_deg: 0.5,
+        roll_sd_deg: 0.1,
+        foreshortened: 0.98,
+        moves_px: 0.1,
+    };
+    for is_seen in [true, false] {
+        let mut shown = snapshot(Phase::Live);
+        shown.camera.tag = Some(TagState { scale, is_seen });
+        let screen = drawn(&state(shown), Depth::None, 200, 60).to_string();
+        assert!(screen.contains("0.00400 m/px ±1.0 %"), "{screen}");
+        assert_eq!(screen.contains("not seen  0.00400"), !is_seen, "{screen}");
+    }
+    let without = drawn(&state(snapshot(Phase::Live)), Depth::None, 200, 60);
+    assert!(!without.to_string().contains("m/px"));
 }
 
 #[test]
