@@ -32,7 +32,8 @@
 //! like an example · [`import`] sketches, modelled trees and point clouds · [`cloud`] trees in
 //! point clouds · [`calibrate`] a lens by a chessboard · [`signal`] common mathematics · [`random`]
 //! seeded random numbers · [`caught`] panics of other crates · [`draw`] pictures of the model ·
-//! [`pipeline`] all of it, step by step · `runtime` on threads · `recording` frames and tracks on disk · [`document`] a tree as a folder, written and
+//! [`pipeline`] all of it, step by step · `runtime` on threads · `recording` frames and tracks on disk ·
+//! [`document`] a tree as a folder, written and
 //! read · [`files`] that appear when they are complete · [`export`] files for other programs ·
 //! [`views`] what is made of a document · [`report`] tables and plots of the sway · `tui` the
 //! screen · `doctor` checks of the machine · `cli` the commands · [`config`] the settings ·

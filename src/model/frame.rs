@@ -45,6 +45,12 @@ impl Size {
             && at_px.x < self.width as f64 - 0.5
             && at_px.y < self.height as f64 - 0.5
     }
+
+    /// The pixel whose centre is nearest to `at_px`, counted row by row; `None` outside of the picture.
+    pub fn pixel_at(self, at_px: Point2<f64>) -> Option<usize> {
+        let [u, v] = [at_px.x, at_px.y].map(|px| (px + 0.5) as usize);
+        self.contains(at_px).then_some(v * self.width as usize + u)
+    }
 }
 
 impl std::fmt::Display for Size {

@@ -19,10 +19,8 @@ pub struct Outline {
 impl Outline {
     /// Whether the pixel nearest to (`u_px`, `v_px`) is tree; outside the picture nothing is.
     pub fn contains(&self, u_px: f64, v_px: f64) -> bool {
-        self.size.contains(Point2::new(u_px, v_px)) && {
-            let [u, v] = [u_px, v_px].map(|px| (px + 0.5) as usize);
-            self.mask[v * self.size.width as usize + u] != 0
-        }
+        let pixel = self.size.pixel_at(Point2::new(u_px, v_px));
+        pixel.is_some_and(|pixel| self.mask[pixel] != 0)
     }
 
     /// Whether the pixel in column `u` and row `v` is tree; outside the picture none is.

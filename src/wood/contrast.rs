@@ -151,9 +151,8 @@ impl<S: Fn(Point2<f64>) -> Option<f64>> Scene<'_, S> {
     /// The score so far to the left of a place; `None` where that is hidden or outside.
     fn seen(&self, place: &Place, off_px: f64) -> Option<f64> {
         let middle = place.at_px + off_px * place.left;
-        let [u, v] = [middle.x, middle.y].map(|c| c.round().max(0.0) as usize);
-        let pixel = v * self.size.width as usize + u;
-        if !self.size.contains(middle) || self.hides.get(pixel).is_none_or(|hides| *hides) {
+        let pixel = self.size.pixel_at(middle)?;
+        if self.hides.get(pixel).is_none_or(|hides| *hides) {
             return None;
         }
         let across = ACROSS.iter().map(|share| share * self.off_px * place.left);

@@ -8,7 +8,6 @@ use super::joined::Parts;
 use super::photograph::{NotSeen, Photograph};
 use super::{ways, widened};
 use crate::model::{BranchGraph, Outline, Size};
-use nalgebra::Point2;
 
 /// Leaves differ from what is around the crown if they do by so many standard errors. Round six trees of made
 /// photographs it is 7.1 to 23, on 24 places of their lawns 3.5 at most (even seeds of 36002 to 36006, 38002,
@@ -75,7 +74,7 @@ pub fn refuse_other(
     let size = crown.size;
     let off_px = off_px(crown)?;
     let nodes = branches.nodes.iter();
-    let places = nodes.filter_map(|node| pixel_at(node.position_px, size));
+    let places = nodes.filter_map(|node| size.pixel_at(node.position_px));
     let nearest_px = places
         .map(|pixel| off_px[pixel])
         .fold(f32::INFINITY, f32::min);
@@ -106,12 +105,6 @@ pub fn without_far_pieces(leaves: &mut [u8], size: Size) -> opencv::Result<()> {
         *leaf = if is_small { 0 } else { *leaf };
     }
     Ok(())
-}
-
-/// The pixel at a place; `None` outside of the picture.
-fn pixel_at(at_px: Point2<f64>, size: Size) -> Option<usize> {
-    let [u, v] = [at_px.x, at_px.y].map(|c| c.round().max(0.0) as usize);
-    size.contains(at_px).then_some(v * size.width as usize + u)
 }
 
 #[cfg(test)]

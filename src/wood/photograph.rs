@@ -270,8 +270,7 @@ fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
         let count = way.norm().ceil().max(1.0) as usize;
         for step in 0..count {
             let at = ends[0] + way * (step as f64 / count as f64);
-            let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
-            radii.extend(inside_px.get(v * size.width as usize + u));
+            radii.extend(size.pixel_at(at).map(|pixel| inside_px[pixel]));
         }
     }
     radii.truncate(radii.len().div_ceil(2));
@@ -336,9 +335,7 @@ fn hidden_share(from: Point2<f64>, to: Point2<f64>, leaves: &[u8], size: Size) -
     let mut hidden = 0;
     for step in 1..=steps {
         let at = from + (to - from) * (step as f64 / steps as f64);
-        let [u, v] = [at.x, at.y].map(|c| c.round().max(0.0) as usize);
-        let place = v * size.width as usize + u;
-        hidden += usize::from(leaves.get(place).is_some_and(|leaf| *leaf != 0));
+        hidden += usize::from(size.pixel_at(at).is_some_and(|pixel| leaves[pixel] != 0));
     }
     hidden as f64 / steps as f64
 }

@@ -248,7 +248,8 @@ impl Sheet {
             self.state.help = false;
             return Next::Stay;
         }
-        if key.code == KeyCode::Char('?') {
+        let bound = KEYS.iter().find(|b| b.key == key.code);
+        if bound.is_some_and(|b| b.action == Action::Help) {
             self.state.help = !self.state.help;
             return Next::Stay;
         }
@@ -256,8 +257,7 @@ impl Sheet {
         if let Some(drawing) = self.state.drawing.take() {
             let Some(bound) = DRAWING.iter().find(|b| b.key == key.code) else {
                 self.state.drawing = Some(drawing);
-                if let Some(other) = KEYS.iter().find(|b| b.key == key.code) {
-                    let shown = other.shown;
+                if let Some(Binding { shown, .. }) = bound {
                     self.state.say(format!(
                         "Enter ends the line that is drawn, Esc leaves it; then {shown} works again."
                     ));
@@ -271,7 +271,7 @@ impl Sheet {
                 _ => Next::Stay,
             };
         }
-        match KEYS.iter().find(|b| b.key == key.code).map(|b| b.action) {
+        match bound.map(|b| b.action) {
             Some(Action::Draw(subject)) => {
                 self.state.unsay();
                 begin_drawing(subject, &mut self.state, placed);

@@ -14,6 +14,7 @@ use std::sync::Arc;
 const LEAVES_TINT: [u8; 3] = [0x20, 0xe0, 0x40];
 const WOOD_TINT: [u8; 3] = [0xff, 0x90, 0x30];
 const TINT: f64 = 0.45;
+
 impl Sheet {
     /// Puts what is drawn and found into what the picture is made of.
     pub(super) fn show(&mut self) {
