@@ -174,6 +174,7 @@ fn outline(points: &[PlantPoint]) -> Outline {
         // Only for drawing.
         polygon_px: Vec::new(),
         matte: None,
+        other_foot_px: None,
     }
 }
 

@@ -166,6 +166,7 @@ fn no_point_is_looked_for_on_the_border_of_a_wide_tree() {
     let mask = crown(outline.size);
     let without_matte = Outline {
         matte: None,
+        other_foot_px: None,
         ..outline.clone()
     };
     assert!(
@@ -175,6 +176,7 @@ fn no_point_is_looked_for_on_the_border_of_a_wide_tree() {
     let points = detect(&Outline {
         mask: mask.clone(),
         matte: Some(mask),
+        other_foot_px: None,
         ..outline
     });
     assert!(points.len() >= 20, "{} points", points.len());
@@ -194,6 +196,7 @@ fn no_point_is_looked_for_outside_the_outline_that_is_shown() {
     let points = detect(&Outline {
         mask: left,
         matte: Some(two),
+        other_foot_px: None,
         ..outline
     });
     assert!(points.len() >= 5, "{} points", points.len());

@@ -118,6 +118,7 @@ mod tests {
             mask: vec![255; size.area()],
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         let mut flat = Attractors::in_picture(&tree, Point2::new(30.0, 39.0));
         let count = flat.places.len() as f64;

@@ -69,6 +69,9 @@ pub struct CaptureFacts {
     pub brightness: Option<f64>,
     /// `None` without a tree.
     pub foot: Option<FootBasis>,
+    /// The outline that was found by motion holds another trunk.
+    #[serde(default)]
+    pub has_other_trunk: bool,
     /// `None` where it was not analysed to the end.
     pub sway: Option<SwayFacts>,
     /// How the camera shakes; `None` where that is not known.
@@ -179,6 +182,7 @@ impl CaptureFacts {
             self.is_short(),
             self.loses_points(),
             self.has_no_foot(),
+            self.is_not_alone(),
         ];
         let mut findings: Vec<Finding> = found.into_iter().flatten().collect();
         let sway = self.tells_no_sway(findings.is_empty());
@@ -322,6 +326,14 @@ impl CaptureFacts {
             grade: Grade::Fair,
             reason: reason.into(),
             advice: advice.into(),
+        })
+    }
+
+    fn is_not_alone(&self) -> Option<Finding> {
+        self.has_other_trunk.then(|| Finding {
+            grade: Grade::Fair,
+            reason: "two trunks in the outline".into(),
+            advice: "draw an outline around one tree".into(),
         })
     }
 

@@ -17,6 +17,8 @@ pub struct Foot {
     /// drawn wide.
     pub half_width_px: f64,
     pub basis: FootBasis,
+    /// Where another trunk stands that the outline holds.
+    pub other_px: Option<Point2<i32>>,
 }
 
 /// A row of the trunk in an outline: its columns, the last one included, px.
@@ -54,6 +56,7 @@ impl Foot {
                 position_px: Point2::origin(),
                 half_width_px: 1.0,
                 basis: FootBasis::Guessed,
+                other_px: outline.other_foot_px,
             };
         };
         let [left, top, right, bottom] = bounds.map(f64::from);
@@ -73,6 +76,7 @@ impl Foot {
                 } else {
                     FootBasis::Outline
                 },
+                other_px: outline.other_foot_px,
             };
         }
         let first = parts.first().map_or(left, |part| f64::from(part.first));
@@ -82,6 +86,7 @@ impl Foot {
             position_px: Point2::new(u, bottom),
             half_width_px: (last - first + 1.0).min(thickest_px) / 2.0,
             basis: FootBasis::Guessed,
+            other_px: outline.other_foot_px,
         }
     }
 
@@ -214,6 +219,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         }
     }
 

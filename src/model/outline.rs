@@ -14,6 +14,9 @@ pub struct Outline {
     /// Opacity of the tree, 0 to 255, row by row, where the region was solved from scribbles: the
     /// sky between its branches has none, though it is inside.
     pub matte: Option<Vec<u8>>,
+    /// Where another trunk stands that the region holds, px: known of outlines that were found by
+    /// motion.
+    pub other_foot_px: Option<Point2<i32>>,
 }
 
 impl Outline {

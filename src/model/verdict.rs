@@ -153,6 +153,7 @@ mod tests {
             },
             brightness: Some(110.0),
             foot: Some(FootBasis::Outline),
+            has_other_trunk: false,
             sway: Some(SwayFacts {
                 branches: 12,
                 identified: 5,
@@ -251,6 +252,11 @@ mod tests {
             "close-up",
             |f| f.foot = Some(FootBasis::CutOff),
             "fair, because: foot cut off. To do: film the whole tree with its foot",
+        );
+        check(
+            "a tree behind it moves, too, and no outline was drawn",
+            |f| f.has_other_trunk = true,
+            "fair, because: two trunks in the outline. To do: draw an outline around one tree",
         );
         check(
             "only branches are identified",

@@ -3,7 +3,7 @@
 //! motion taken off.
 
 use super::steady::steadiness;
-use super::{region, still, trunk};
+use super::{feet, region, still, trunk};
 use crate::config;
 use crate::model::{CameraMotion, Luma, Outline, Size};
 use crate::signal::median;
@@ -172,9 +172,17 @@ impl AutoOutline {
         // The border is traced anew at full size, so that it encloses just the pixels of the mask.
         let camera = self.kept.first()?.camera;
         let mask = enlarged(&small, size, self.scale, &camera);
-        region::close_to_one(size, &mask, 0).unwrap_or_else(|e| {
+        let outline = region::close_to_one(size, &mask, 0).unwrap_or_else(|e| {
             tracing::error!("automatic outline: {e}");
             None
+        })?;
+        let at_first = |foot: Point2<i32>| {
+            let steady_px = foot.cast::<f64>() * f64::from(self.scale);
+            camera.filmed_px(steady_px).map(|px| px.round() as i32)
+        };
+        Some(Outline {
+            other_foot_px: small.other_foot_px.map(at_first),
+            ..outline
         })
     }
 
@@ -200,7 +208,16 @@ impl AutoOutline {
             let below = trunk.waist * size.width as usize;
             wide[below..].copy_from_slice(&one.mask[below..]);
         }
-        Ok(region::close_to_one(size, &wide, 0)?.filter(|o| o.coverage() >= LEAST_COVERAGE))
+        let outline = region::close_to_one(size, &wide, 0)?;
+        let first = self.kept.first().map(|kept| &kept.picture);
+        let other_foot_px =
+            first.and_then(|first| feet::second_foot(first, &one.mask, &self.motion()));
+        Ok(outline
+            .filter(|o| o.coverage() >= LEAST_COVERAGE)
+            .map(|outline| Outline {
+                other_foot_px,
+                ..outline
+            }))
     }
 
     /// The pixels that move and were tree in the first picture, 255 there and 0 elsewhere; `None`
@@ -222,11 +239,7 @@ impl AutoOutline {
 
     /// Which pixels change more than noise does.
     fn moving(&self) -> Vec<bool> {
-        let mut deviation: Vec<f32> = Vec::with_capacity(self.sum_sq.len());
-        for (sum_sq, sum_change_sq) in self.sum_sq.iter().zip(&self.sum_change_sq) {
-            let variance = (sum_sq - 0.5 * sum_change_sq) / (self.count - 1.0);
-            deviation.push(variance.max(0.0).sqrt());
-        }
+        let deviation = self.motion();
         let mut sorted = deviation.clone();
         let quarter = sorted.len() / 4;
         let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
@@ -241,6 +254,16 @@ impl AutoOutline {
             moving.push(inside && d > threshold);
         }
         moving
+    }
+
+    /// Motion energy: the standard deviation of every pixel over time, without noise.
+    fn motion(&self) -> Vec<f32> {
+        let mut deviation = Vec::with_capacity(self.sum_sq.len());
+        for (sum_sq, sum_change_sq) in self.sum_sq.iter().zip(&self.sum_change_sq) {
+            let variance = (sum_sq - 0.5 * sum_change_sq) / (self.count - 1.0);
+            deviation.push(variance.max(0.0).sqrt());
+        }
+        deviation
     }
 
     /// Median of every pixel over time.
@@ -309,6 +332,7 @@ pub fn whole(size: Size) -> Outline {
         mask: vec![255; size.area()],
         polygon_px: [[0, 0], [w, 0], [w, h], [0, h]].map(Point2::from).to_vec(),
         matte: None,
+        other_foot_px: None,
     }
 }
 

@@ -4,6 +4,7 @@
 mod auto;
 mod density;
 mod error;
+mod feet;
 mod laplacian;
 mod matting;
 mod middle;
@@ -127,5 +128,6 @@ pub fn covered(polygons_px: &[Vec<Point2<f64>>], size: Size) -> Result<Outline, 
         mask,
         polygon_px: Vec::new(),
         matte: None,
+        other_foot_px: None,
     })
 }

@@ -37,6 +37,7 @@ pub fn fill(size: Size, polygon_px: &[Point2<f64>]) -> opencv::Result<Outline> {
         mask: mask.data_bytes()?.to_vec(),
         polygon_px: corners.iter().map(|c| Point2::new(c.x, c.y)).collect(),
         matte: None,
+        other_foot_px: None,
     })
 }
 
@@ -87,6 +88,7 @@ pub fn close_to_one(size: Size, mask: &[u8], close_px: u32) -> opencv::Result<Op
         mask: filled.data_bytes()?.to_vec(),
         polygon_px,
         matte: None,
+        other_foot_px: None,
     }))
 }
 

@@ -4,6 +4,7 @@ use super::shaking::{CameraShownBy, ShakeMeter};
 use super::shared::Shared;
 use crate::model::{Background, FootBasis, Shake, TrackSet, WoodSight};
 use crate::solve::Model;
+use nalgebra::Point2;
 use std::sync::Arc;
 
 /// The warning of a tree in whose film no wood is seen.
@@ -84,6 +85,9 @@ impl Announced {
                 FootBasis::CutOff => shared.warn(FOOT_CUT_OFF.into()),
                 FootBasis::Guessed => shared.warn(FOOT_GUESSED.into()),
                 FootBasis::Outline | FootBasis::Drawn => {}
+            }
+            if let Some(other_px) = tree.foot.other_px {
+                shared.warn(two_trunks(other_px));
             }
             let (points, time_s) = (tree.evidence.moving.len(), tree.time_s);
             tracing::info!(
@@ -188,4 +192,13 @@ pub fn little_motion(tree: &Model, threshold: f64) -> Option<String> {
              branches may be wrong: film longer, or in more wind"
         )
     })
+}
+
+/// The warning where the outline that was found by motion holds another trunk.
+fn two_trunks(other_px: Point2<i32>) -> String {
+    format!(
+        "another trunk stands in the outline that was found, at {},{}: some of the branches may be those \
+         of another tree; draw an outline around one tree (key o, or --outline FILE)",
+        other_px.x, other_px.y
+    )
 }

@@ -5,7 +5,7 @@ use super::shaking::CameraShownBy;
 use crate::config::Dynamics;
 use crate::dynamics::Take;
 use crate::model::{
-    CaptureFacts, FilmCut, FootBasis, Judgement, Picture, PointFacts, SwayFacts, TrackLog,
+    CaptureFacts, FilmCut, Foot, Judgement, Picture, PointFacts, SwayFacts, TrackLog,
 };
 use crate::signal::statistics::quantile;
 use crate::solve::Model;
@@ -25,7 +25,7 @@ pub struct JudgedFilm<'a> {
     /// Mean grey of the picture, 0 to 255.
     pub brightness: Option<f64>,
     /// `None` without a tree.
-    pub foot: Option<FootBasis>,
+    pub foot: Option<Foot>,
     pub sway: Option<SwayFacts>,
     /// `None` where the film is in one piece, or that is not known yet.
     pub cut: Option<FilmCut>,
@@ -57,7 +57,8 @@ impl JudgedFilm<'_> {
                 lost_per_s: self.quality.lost_per_s(),
             },
             brightness: self.brightness,
-            foot: self.foot,
+            foot: self.foot.map(|foot| foot.basis),
+            has_other_trunk: self.foot.is_some_and(|foot| foot.other_px.is_some()),
             sway: self.sway,
             shake: shaking.shake,
             is_camera_unknown: shaking.shown_by() == CameraShownBy::Nothing,
@@ -83,7 +84,7 @@ pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
         log: &job.log,
         settings: &job.config.dynamics,
         brightness: job.picture.as_ref().and_then(mean_grey),
-        foot: tree.map(|tree| tree.foot.basis),
+        foot: tree.map(|tree| tree.foot),
         sway: tree.and_then(|tree| SwayFacts::of(&tree.skeleton, &tree.modes)),
         cut: take.cut(),
     };

@@ -64,7 +64,7 @@ impl LiveVerdict {
             log: back.log(),
             settings,
             brightness: self.brightness,
-            foot: model.map(|model| model.foot.basis),
+            foot: model.map(|model| model.foot),
             sway: model.and_then(|model| self.sway_facts(model)),
             cut: None,
         };

@@ -327,6 +327,7 @@ mod tests {
             mask: vec![255; 48],
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         for foot in [1e18, -1e18, 7.5] {
             let envelope = Envelope::of_drawn(&outline, Point2::new(foot, foot));

@@ -93,6 +93,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: matte.then_some(alpha),
+            other_foot_px: None,
         }
     }
 

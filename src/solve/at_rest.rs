@@ -43,6 +43,7 @@ pub(super) fn at_rest(
             .as_ref()
             .map(|matte| carried(matte, &field, outline.size)),
         polygon_px: polygon_at_rest(outline, &field),
+        other_foot_px: outline.other_foot_px,
     }
 }
 
@@ -113,6 +114,7 @@ mod tests {
             mask,
             polygon_px: vec![Point2::new(95, 10)],
             matte: None,
+            other_foot_px: None,
         }
     }
 

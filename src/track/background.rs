@@ -273,6 +273,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         }
     }
 

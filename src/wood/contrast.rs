@@ -320,6 +320,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         let around = Around {
             crown: &crown,

@@ -292,6 +292,7 @@ mod tests {
             mask: vec![255; SIZE.area()],
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         }
     }
 
@@ -331,6 +332,7 @@ mod tests {
                 position_px: FOOT,
                 half_width_px: 10.0,
                 basis: FootBasis::Outline,
+                other_px: None,
             },
             strokes,
             trace_by: TraceBy::Paths,

@@ -419,6 +419,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         let photo = Photograph {
             picture,

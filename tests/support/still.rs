@@ -99,6 +99,7 @@ pub fn still_before(in_leaf: bool, backdrop: fn(usize, usize) -> [i32; 3]) -> St
         mask,
         polygon_px: Vec::new(),
         matte: None,
+        other_foot_px: None,
     };
     Still {
         skeleton,

@@ -195,6 +195,7 @@ mod tests {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         let view = LeafView {
             picture: Some(&picture),

@@ -66,6 +66,7 @@ fn model(config: &Config) -> Arc<Model> {
         mask: vec![u8::MAX; size.area()],
         polygon_px: Vec::new(),
         matte: None,
+        other_foot_px: None,
     });
     let mut log = TrackLog::new(config.accumulate.window_s);
     (0..=BUILT).for_each(|frame| drop(log.push(tracks(frame))));

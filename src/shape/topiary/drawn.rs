@@ -128,6 +128,7 @@ impl Drawn {
             mask,
             polygon_px: Vec::new(),
             matte: None,
+            other_foot_px: None,
         };
         placed
             .bounds_px()
