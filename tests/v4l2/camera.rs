@@ -2,9 +2,10 @@
 //! through `vhci_hcd`. The kernel sees it as plugged into a port, with vendor, product and serial
 //! number; `uvcvideo` makes the /dev/video device. Ending this process pulls the plug.
 //!
-//!     usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE
+//!     usb-camera CLIP WIDTH HEIGHT FPS SERIAL PORT GATE
 //!
-//! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there;
+//! It delivers the pictures of CLIP over and over, as they are, while the file GATE is there: JPEG
+//! pictures, or, where its name ends in `.z16`, depth images of 16 bits a pixel;
 //! without it, it is a camera that answers and films nothing. While GATE.deaf is there it answers
 //! nothing at all, and whoever closes it waits in the kernel until it is pulled out.
 
@@ -27,8 +28,16 @@ const HEADER: usize = 2;
 /// Time between two looks while nothing is to be sent.
 const IDLE: Duration = Duration::from_millis(50);
 
+/// What a picture is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Encoding {
+    Jpeg,
+    Depth,
+}
+
 /// What is filmed.
 pub struct Mode {
+    pub encoding: Encoding,
     pub width: u16,
     pub height: u16,
     pub fps: u32,
@@ -60,7 +69,7 @@ pub fn main(args: &[String]) -> ExitCode {
 fn plug_in(args: &[String]) -> io::Result<()> {
     let [clip, width, height, fps, serial, port, gate] = args else {
         return Err(io::Error::other(
-            "usb-camera CLIP.mjpg WIDTH HEIGHT FPS SERIAL PORT GATE",
+            "usb-camera CLIP WIDTH HEIGHT FPS SERIAL PORT GATE",
         ));
     };
     let number = |text: &str| {
@@ -68,13 +77,25 @@ fn plug_in(args: &[String]) -> io::Result<()> {
             .map_err(|_| io::Error::other(format!("{text} is no number")))
     };
     let mode = Mode {
+        encoding: if clip.ends_with(".z16") {
+            Encoding::Depth
+        } else {
+            Encoding::Jpeg
+        },
         width: number(width)?,
         height: number(height)?,
         fps: u32::from(number(fps)?).max(1),
         serial: serial.clone(),
     };
     let port = number(port)?;
-    let pictures = pictures(&std::fs::read(clip)?);
+    let clip = std::fs::read(clip)?;
+    let pictures = match mode.encoding {
+        Encoding::Jpeg => jpeg_pictures(&clip),
+        Encoding::Depth => {
+            let images = clip.chunks_exact(mode.picture_bytes() as usize);
+            images.map(<[u8]>::to_vec).collect()
+        }
+    };
     if pictures.is_empty() {
         return Err(io::Error::other("no picture in the clip"));
     }
@@ -104,7 +125,7 @@ fn plug_in(args: &[String]) -> io::Result<()> {
 }
 
 /// The JPEG pictures of a file that holds nothing else, one after the other.
-fn pictures(bytes: &[u8]) -> Vec<Vec<u8>> {
+fn jpeg_pictures(bytes: &[u8]) -> Vec<Vec<u8>> {
     let mut found = Vec::new();
     let mut from = 0;
     while let Some(at) = bytes[from..].windows(2).position(|w| w == [0xff, 0xd9]) {

@@ -1,6 +1,7 @@
 //! A USB camera with a serial number, pulled out and plugged in again under a running capture.
 
-use crate::guest::{Group, Results, claim, clip, end_limit_s, slack};
+use crate::guest::{Group, Results, claim, clip, end_limit_s, frames_of, slack};
+use std::path::Path;
 
 /// Times that the script unplugs it.
 const CYCLES: usize = 20;
@@ -11,8 +12,8 @@ pub const GROUP: Group = Group {
     name: "replug",
     script: "replug.sh",
     first: "script",
-    limit_s: 400,
-    provide: clip,
+    limit_s: 440,
+    provide,
     cases: &[
         (
             "each_of_twenty_returns_is_taken_within_two_seconds",
@@ -34,8 +35,44 @@ pub const GROUP: Group = Group {
             deaf,
         ),
         ("a_camera_is_known_by_its_serial_number", identity),
+        ("a_depth_camera_is_listed_as_one", depth_is_listed),
+        ("depth_comes_through_the_kernel_as_it_was_sent", depth),
+        (
+            "a_depth_camera_that_is_pulled_out_comes_back",
+            depth_returns,
+        ),
     ],
 };
+
+/// Depth images that are sent over and over, and their size.
+const DEPTH_IMAGES: u16 = 30;
+const WIDTH: u16 = 320;
+const HEIGHT: u16 = 180;
+
+/// What the depth camera sends: a plane that is farther away to the right and downwards, mm. The
+/// first pixel has the image's number.
+fn depth_mm(image: u16, u: u16, v: u16) -> u16 {
+    if (u, v) == (0, 0) {
+        return 1000 + image;
+    }
+    1500 + 3 * u + v
+}
+
+fn provide(folder: &Path) -> Result<(), String> {
+    clip(folder)?;
+    let mut bytes = Vec::new();
+    for image in 0..DEPTH_IMAGES {
+        for v in 0..HEIGHT {
+            bytes.extend((0..WIDTH).flat_map(|u| depth_mm(image, u, v).to_le_bytes()));
+        }
+    }
+    let camera = r#"{"fx": 300.0, "fy": 300.0, "cx": 160.0, "cy": 90.0}"#;
+    let write = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.join(name), bytes).map_err(|e| format!("{name}: {e}"))
+    };
+    write("depth.z16", &bytes)?;
+    write("depth-camera.json", camera.as_bytes())
+}
 
 /// Seconds of each cycle: pulled, back, frames again; and the count of poses before and after.
 fn cycles(r: &Results) -> Result<Vec<Vec<f64>>, String> {
@@ -207,4 +244,92 @@ fn identity(r: &Results) -> Result<(), String> {
         mode["format"] == "MJPG" && mode["width"] == 320 && mode["rates_hz"][0] == 15.0,
         || films.to_string(),
     )
+}
+
+fn depth_is_listed(r: &Results) -> Result<(), String> {
+    let text = r.text("devices-depth.json")?;
+    let devices: serde_json::Value =
+        serde_json::from_str(&text).map_err(|e| format!("{e}: {text}"))?;
+    let depth = devices
+        .as_array()
+        .and_then(|all| all.iter().find(|d| d["serial"] == "depth"));
+    let mode = &depth.ok_or_else(|| text.clone())?["depth_modes"][0];
+    claim(
+        mode["format"] == "Z16" && mode["width"] == WIDTH && mode["rates_hz"][0] == 30.0,
+        || text.clone(),
+    )
+}
+
+fn depth_said(r: &Results) -> String {
+    r.messages("depth").unwrap_or_default()
+}
+
+/// Every image that was recorded is one that was sent, to the last pixel, and the depth of every
+/// point is that of the plane.
+fn depth(r: &Results) -> Result<(), String> {
+    let status = r.status("depth")?;
+    claim(status == "130", || {
+        format!("status {status}: {}", depth_said(r))
+    })?;
+    let frames = frames_of(&r.path("depth.mcap"))?;
+    let images: Vec<_> = frames.iter().filter_map(|f| f.depth.as_ref()).collect();
+    claim(2 * images.len() > frames.len() && images.len() > 50, || {
+        let said = depth_said(r);
+        format!(
+            "{} of {} frames have depth: {said}",
+            images.len(),
+            frames.len()
+        )
+    })?;
+    for image in images {
+        let is_sent = |number: u16| {
+            let pixels = (0..HEIGHT).flat_map(|v| (0..WIDTH).map(move |u| (u, v)));
+            let sent = pixels.map(|(u, v)| depth_mm(number, u, v));
+            sent.eq(image.counts.iter().copied())
+        };
+        claim((0..DEPTH_IMAGES).any(is_sent), || {
+            format!("an image was not sent: {:?}", &image.counts[..8])
+        })?;
+    }
+    let tracks = r.text("depth/capture/tracks.csv")?;
+    let head: Vec<&str> = tracks
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .split(',')
+        .collect();
+    let column = |name: &str| {
+        head.iter()
+            .position(|h| *h == name)
+            .ok_or("no depth column")
+    };
+    let columns = [column("u_px")?, column("v_px")?, column("depth_m")?];
+    let mut known = 0;
+    for row in tracks.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let [u, v, depth_m] = columns.map(|c| cells.get(c).and_then(|c| c.parse::<f64>().ok()));
+        let (Some(u), Some(v), Some(depth_m)) = (u, v, depth_m) else {
+            continue;
+        };
+        known += 1;
+        let plane_m = 0.001 * (1500.0 + 3.0 * u + v);
+        // The nearest thing among the pixels about it counts: the plane is 16 mm deep there.
+        claim((depth_m - plane_m).abs() < 0.02, || {
+            format!("{depth_m} m instead of {plane_m} at {u}, {v}")
+        })?;
+    }
+    claim(known > 1000, || {
+        format!("{known} depths: {}", depth_said(r))
+    })
+}
+
+fn depth_returns(r: &Results) -> Result<(), String> {
+    let timing = &r.capture("depth")?["timing"]["depth"];
+    claim(timing["absences"] == 1, || {
+        format!("{timing}: {}", depth_said(r))
+    })?;
+    let said = depth_said(r);
+    claim(said.contains("the depth camera was lost at"), || {
+        said.clone()
+    })
 }

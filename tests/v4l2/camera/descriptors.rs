@@ -1,7 +1,7 @@
-//! What the camera says of itself: a UVC 1.1 device with one MJPEG format of one size and rate,
-//! over a bulk endpoint.
+//! What the camera says of itself: a UVC 1.1 device with one format of one size and rate, MJPEG or
+//! depth, over a bulk endpoint.
 
-use super::{Mode, PAYLOAD};
+use super::{Encoding, Mode, PAYLOAD};
 
 const DEVICE: u8 = 1;
 const CONFIGURATION: u8 = 2;
@@ -11,6 +11,8 @@ const CLASS: u8 = 0x24;
 /// For testing: no real product has these.
 const VENDOR: u16 = 0x1209;
 const PRODUCT: u16 = 0xa4b0;
+/// By which `uvcvideo` knows depth of 16 bits, as RealSense cameras send it.
+const DEPTH_GUID: [u8; 16] = *b"Z16 \x00\x00\x10\x00\x80\x00\x00\xaa\x00\x38\x9b\x71";
 
 /// The descriptor of this kind and number, if there is one.
 pub fn descriptor(mode: &Mode, kind: u8, index: u8) -> Option<Vec<u8>> {
@@ -66,7 +68,7 @@ fn configuration(mode: &Mode) -> Vec<u8> {
     let control = [13, CLASS, 1, 0x00, 0x01, c0, c1, 0x80, 0x8d, 0x5b, 0, 1, 1];
 
     let streaming_interface = [9, 4, 1, 0, 1, 0x0e, 2, 0, 0];
-    let format = [11, CLASS, 6, 1, 1, 1, 1, 0, 0, 0, 0];
+    let format = format(mode);
     let frame = frame(mode);
     let streaming_length = (14 + format.len() + frame.len()) as u16;
     let [s0, s1] = streaming_length.to_le_bytes();
@@ -92,9 +94,21 @@ fn configuration(mode: &Mode) -> Vec<u8> {
     [&[9, CONFIGURATION, l0, l1, 2, 1, 0, 0x80, 250][..], &body].concat()
 }
 
+/// Format 1, with one size of picture.
+fn format(mode: &Mode) -> Vec<u8> {
+    match mode.encoding {
+        Encoding::Jpeg => vec![11, CLASS, 6, 1, 1, 1, 1, 0, 0, 0, 0],
+        Encoding::Depth => [&[27, CLASS, 4, 1, 1][..], &DEPTH_GUID, &[16, 1, 0, 0, 0, 0]].concat(),
+    }
+}
+
 fn frame(mode: &Mode) -> Vec<u8> {
     let bits_per_s = mode.picture_bytes() * 8 * mode.fps;
-    let mut frame = vec![30, CLASS, 7, 1, 0];
+    let kind = match mode.encoding {
+        Encoding::Jpeg => 7,
+        Encoding::Depth => 5,
+    };
+    let mut frame = vec![30, CLASS, kind, 1, 0];
     frame.extend(mode.width.to_le_bytes());
     frame.extend(mode.height.to_le_bytes());
     frame.extend(bits_per_s.to_le_bytes());

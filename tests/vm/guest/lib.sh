@@ -83,6 +83,18 @@ plug_in() {
     "$helper" usb-camera "$work/clip.mjpg" 320 180 15 "$1" "${2:-0}" "$gate" &
     camera=$!
 }
+# A depth camera in port 1, that delivers /vm/depth.z16 at 30 Hz while $gate is there; its device is $depth.
+plug_in_depth() {
+    "$helper" usb-camera /vm/depth.z16 320 180 30 depth 1 "$gate" &
+    depth_camera=$!
+    until_ok 10 compgen -G '/sys/bus/usb/devices/1-2:1.0/video4linux/video*'
+    depth=/dev/$(cd /sys/bus/usb/devices/1-2:1.0/video4linux && ls | head -1)
+    until_ok 10 test -e "$depth"
+}
+pull_out_depth() {
+    kill "$depth_camera"
+    wait "$depth_camera" 2>/dev/null || true
+}
 pull_out() {
     kill "$camera"
     wait "$camera" 2>/dev/null || true

@@ -15,7 +15,7 @@ film_live() {
     player=$!
     until_ok 10 fed
     # A stop does not wait for a refinement that is under way, nor for the wood to be found, which takes an emulated processor
-    # a minute: which tree is the last one would be up to chance. tests/recording.rs has both.
+    # a minute: which tree is the last one would be up to chance. tests/commands/recording.rs has both.
     printf '[camera]\nformat = "%s"\nwidth = 320\nheight = 180\nrate_hz = %s\n[detect]\npoints = 120\n[accumulate]\nrefine_s = 0.0\n[skeleton]\nalong_wood = false\n' \
         "$format" "$1" >"$work/camera.toml"
     rm -rf "/vm/live-$format" "$work/live-$format.mcap"

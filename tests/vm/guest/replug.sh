@@ -69,3 +69,22 @@ until_ok 40 test -e "$work/deaf/capture.json" || stacks "the capture is not writ
 now >/vm/deaf/written
 pull_out
 end 20
+# A depth camera beside a camera, pulled out and plugged in again under the capture.
+rm "$gate.deaf"
+plug_in one
+plug_in_depth
+until_ok 10 compgen -G '/sys/bus/usb/devices/1-1:1.0/video4linux/video*'
+colour=/dev/$(cd /sys/bus/usb/devices/1-1:1.0/video4linux && ls | head -1)
+until_ok 10 test -e "$colour"
+"$bin" devices --json >/vm/devices-depth.json 2>/vm/devices-depth.err
+begin depth capture "$colour" --depth "$depth" --depth-unit 0.001 --depth-camera /vm/depth-camera.json --headless \
+    "${usb_settings[@]}" --out "$work/depth" --record /vm/depth.mcap
+until_ok 10 filming "$pid"
+sleep 5
+pull_out_depth
+sleep 3
+plug_in_depth
+sleep 5
+stop
+pull_out_depth
+pull_out
