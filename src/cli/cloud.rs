@@ -8,7 +8,6 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
-use crate::bounds::Bounds;
 use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud};
 use crate::config::Config;
 use crate::document::Document;
@@ -18,7 +17,7 @@ use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
 use crate::views::{
-    DrawnTree, FilmFit, FilmOnScan, FilmedPoint, register_film, scan_defaults, sway_on_scan,
+    DrawnTree, FilmFit, FilmOnScan, filmed_points, register_film, scan_defaults, sway_on_scan,
 };
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
@@ -322,18 +321,11 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let window_s = film.note.config.dynamics.window_s;
-        let points = film.tracked_within(window_s, Bounds::new(0.0, f64::INFINITY))?;
-        let mut filmed = Vec::with_capacity(points.tracks.len());
-        for track in &points.tracks {
-            let node = track.node;
-            filmed.extend(track.middle_px().map(|at_px| FilmedPoint { node, at_px }));
-        }
         let sway = sway_on_scan(
             &document.skeleton,
             metres_per_px,
             &film,
-            &filmed,
+            &filmed_points(&film)?,
             &fit.registration,
         );
         Ok(Some(FilmOnScan { fit, sway }))

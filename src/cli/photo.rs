@@ -28,10 +28,6 @@ use picture::{PictureArgs, ShownPicture};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Of 40 made photographs with strokes one tree has more than this share of its length that runs level: it is
-/// before windows, of which some are traced. Of what is traced on walls without strokes it is 0.06 to 0.13.
-const MUCH_LEVEL: f64 = 0.05;
-
 #[derive(Debug, Args)]
 pub struct PhotoArgs {
     #[command(flatten)]
@@ -353,7 +349,7 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if tree.seen.level_share > MUCH_LEVEL {
+    if tree.seen.may_hold_walls() {
         warnings.push(format!(
             "{:.0} % of the branches run level, as edges of buildings do and branches seldom: look whether a wall \
              is among them",

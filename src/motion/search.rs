@@ -4,7 +4,7 @@
 //! from the rest, and from the two directions that are seen where the branch is seen (of a branch
 //! in the picture's plane neither is found from the others: to both sides the slope is 0). Where
 //! the best of these lies on a bound, along which such steps cannot slide, both borders are
-//! searched all round. `tests/pose.rs` holds it against trying everything, as the paper does.
+//! searched all round. `tests/library/pose.rs` holds it against trying everything, as the paper does.
 //!
 //! It does not use the solver of the sway (`signal/least_squares.rs`): that one has boxes as bounds
 //! and one set of parameters, while here every step has axes of its own on the sphere, is turned

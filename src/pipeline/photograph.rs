@@ -151,6 +151,7 @@ pub fn see_tree(
 ) -> Result<TreeInPhoto, PhotoError> {
     let looked = Looked {
         picture,
+        has_colour: has_colour(picture),
         drawn,
         options,
         cancel,
@@ -175,6 +176,7 @@ pub fn see_tree(
 /// A photograph that is looked at.
 struct Looked<'a> {
     picture: &'a Rgb,
+    has_colour: bool,
     drawn: &'a TreeStrokes,
     options: PhotoOptions,
     cancel: &'a CancelToken,
@@ -207,7 +209,7 @@ impl Looked<'_> {
             strokes,
             found: None,
             seen,
-            has_colour: has_colour(self.picture),
+            has_colour: self.has_colour,
         })
     }
 

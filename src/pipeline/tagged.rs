@@ -9,7 +9,7 @@ use crate::tag::{Tag, TagSeen, find_tags, scale_of};
 const SIGHTS: usize = 10;
 const EVERY: u64 = 3;
 const EVERY_THEN: u64 = 30;
-/// Sights that are kept: memory does not grow with the film.
+/// Sights that are kept: memory does not grow with the film. When there are too many, every other one goes.
 const MAX_SIGHTS: usize = 1000;
 /// After so many frames without a sight the user should know.
 const FRAMES_WITHOUT: u64 = 90;
@@ -33,6 +33,8 @@ pub enum TagNews {
 pub(super) struct TagStage {
     settings: config::Tag,
     sights: Vec<TagSeen>,
+    /// In how many frames it was seen.
+    times_seen: usize,
     frames: u64,
     scale: Option<TagScale>,
     news: Vec<TagNews>,
@@ -43,6 +45,7 @@ impl TagStage {
         Self {
             settings: settings.clone(),
             sights: Vec::new(),
+            times_seen: 0,
             frames: 0,
             scale: None,
             news: Vec::new(),
@@ -62,12 +65,12 @@ impl TagStage {
             return None;
         }
         let mut in_frame = None;
-        if is_turn && self.sights.len() < MAX_SIGHTS {
+        if is_turn {
             let known = self.sights.first().map(|seen| seen.tag.id);
             let tags = find_tags(&frame.luma);
             let tag = tags.iter().find(|tag| known.is_none_or(|id| id == tag.id));
             let seen = tag.and_then(TagSeen::of);
-            self.sights.extend(seen);
+            self.keep(seen);
             in_frame = seen.map(|seen| seen.tag);
             if let Some(fixed) = self.scale {
                 let known = self.with_all_sights(fixed);
@@ -84,6 +87,18 @@ impl TagStage {
             self.news.push(TagNews::NoneSeen);
         }
         in_frame
+    }
+
+    fn keep(&mut self, seen: Option<TagSeen>) {
+        self.times_seen += usize::from(seen.is_some());
+        self.sights.extend(seen);
+        if self.sights.len() > MAX_SIGHTS {
+            let mut is_odd = false;
+            self.sights.retain(|_| {
+                is_odd = !is_odd;
+                is_odd
+            });
+        }
     }
 
     /// What stands around the tree moves against the tag, by so much, px.
@@ -106,7 +121,7 @@ impl TagStage {
     fn with_all_sights(&self, fixed: TagScale) -> TagScale {
         match scale_of(&self.sights, self.settings.size_m) {
             Some(all) => TagScale {
-                frames: all.frames,
+                frames: self.times_seen,
                 moves_px: all.moves_px,
                 ..fixed
             },

@@ -45,6 +45,6 @@ pub use scan_film::register_film;
 pub use scan_forest::{StandingTree, scan_forest};
 pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
-pub use sway_on_scan::{FilmedPoint, sway_on_scan};
+pub use sway_on_scan::{FilmedPoint, filmed_points, sway_on_scan};
 pub use tables::TablesWritten;
 pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};

@@ -3,8 +3,9 @@
 //! Each followed point is on the scanned wood that the camera sees there. A filmed branch is the scanned
 //! one that most of its points are on; the points of what it carries count with it, on both sides.
 
+use crate::bounds::Bounds;
 use crate::cloud::{LinePlace, Registration, WoodPiece};
-use crate::document::Document;
+use crate::document::{Document, DocumentError};
 use crate::model::{BotanicalBranches, NodeId, Skeleton, Swaying, Unidentified};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3};
@@ -33,6 +34,21 @@ pub struct FilmedPoint {
     pub node: NodeId,
     /// The middle of its motion, px, v down.
     pub at_px: Point2<f64>,
+}
+
+/// The points of the film that its sway rests on.
+///
+/// # Errors
+/// The tracks of the film are missing or damaged.
+pub fn filmed_points(film: &Document) -> Result<Vec<FilmedPoint>, DocumentError> {
+    let window_s = film.note.config.dynamics.window_s;
+    let tracked = film.tracked_within(window_s, Bounds::new(0.0, f64::INFINITY))?;
+    let mut points = Vec::with_capacity(tracked.tracks.len());
+    for track in &tracked.tracks {
+        let node = track.node;
+        points.extend(track.middle_px().map(|at_px| FilmedPoint { node, at_px }));
+    }
+    Ok(points)
 }
 
 /// The sway of a film on the branches of a scanned tree, by node index. `points` are those of the film.

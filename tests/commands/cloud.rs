@@ -1,0 +1,449 @@
+//! `arborcam cloud`: a tree from a point cloud, its tables, and what bad clouds get.
+
+use crate::chance::Chance;
+use crate::support::names_in;
+use arborcam::document::{Document, ForestDocument};
+use arborcam::import::{CloudFormat, read_cloud, read_model};
+use arborcam::model::{NodeId, NodeKind};
+use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
+use std::fmt::Write as _;
+use std::fs;
+use std::io::BufReader;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const FAILED: i32 = 1;
+const BAD_USAGE: i32 = 2;
+const NO_INPUT: i32 = 3;
+
+fn arborcam(arguments: &[&str], out: &Path) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    command.args(arguments).arg("--out").arg(out);
+    command.output().expect("arborcam")
+}
+
+/// Runs a command that must succeed, and returns what it said.
+fn done(arguments: &[&str], out: &Path) -> String {
+    let output = arborcam(arguments, out);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    said
+}
+
+/// A tapered tube: its ends, and its radii there, m.
+type Tube = ([f64; 3], [f64; 3], f64, f64);
+
+/// A trunk of 5 m with three limbs, one of which bears a fourth.
+const TUBES: [Tube; 5] = [
+    ([0.0, 0.0, 0.0], [0.2, 0.0, 5.0], 0.15, 0.05),
+    ([0.06, 0.0, 1.5], [1.6, 0.3, 3.5], 0.07, 0.02),
+    ([0.1, 0.0, 2.5], [-1.4, 0.8, 4.4], 0.06, 0.02),
+    ([0.14, 0.0, 3.4], [0.4, -1.5, 4.8], 0.05, 0.02),
+    ([0.83, 0.15, 2.5], [1.2, 1.2, 3.4], 0.03, 0.015),
+];
+
+/// Points on tubes at `step` from each other, m, off them by `noise`.
+fn points_on(tubes: &[Tube], step: f64, noise: f64, chance: &mut Chance) -> Vec<Point3<f64>> {
+    let mut points = Vec::new();
+    for (from, to, wide, thin) in tubes {
+        let (from, to) = (Point3::from(*from), Point3::from(*to));
+        let length = (to - from).norm();
+        let along = (to - from) / length;
+        let first = along.cross(&Vector3::new(0.3, 0.9, 0.1)).normalize();
+        let second = along.cross(&first);
+        let rings = (length / step) as usize;
+        for ring in 0..rings {
+            let share = ring as f64 / rings as f64;
+            let radius = wide + (thin - wide) * share;
+            for _ in 0..(std::f64::consts::TAU * radius / step) as usize {
+                let angle = chance.between(0.0, std::f64::consts::TAU);
+                let out = first * angle.cos() + second * angle.sin();
+                points
+                    .push(from + along * length * share + out * (radius + noise * chance.normal()));
+            }
+        }
+    }
+    points
+}
+
+/// The tree on a slope, a thousand kilometres from the origin.
+fn tree_on_ground(chance: &mut Chance) -> Vec<Point3<f64>> {
+    let mut points = points_on(&TUBES, 0.008, 0.003, chance);
+    for _ in 0..40_000 {
+        let [x, y] = [chance.between(-2.5, 2.5), chance.between(-2.5, 2.5)];
+        points.push(Point3::new(x, y, 0.1 * x + 0.01 * chance.even()));
+    }
+    points.iter().map(|p| p + FAR).collect()
+}
+
+const FAR: Vector3<f64> = Vector3::new(512_000.0, 5_403_000.0, 300.0);
+
+fn write_xyz(path: &Path, points: &[Point3<f64>], unit: f64) {
+    let mut text = String::new();
+    for p in points {
+        let _ = writeln!(
+            text,
+            "{:.4} {:.4} {:.4}",
+            p.x / unit,
+            p.y / unit,
+            p.z / unit
+        );
+    }
+    fs::write(path, text).expect("cloud");
+}
+
+fn tree_cloud(path: &Path) {
+    write_xyz(path, &tree_on_ground(&mut Chance::new(7)), 1.0);
+}
+
+#[test]
+fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [cloud, out] = ["tree.xyz", "tree"].map(|name| dir.path().join(name));
+    tree_cloud(&cloud);
+    let name = cloud.to_str().expect("name");
+    let said = done(&["cloud", name], &out);
+    assert!(said.contains("% are ground"), "{said}");
+    assert_eq!(names_in(&out), ["capture.json", "nodes.csv", "tree.glb"]);
+    let tree = Document::read(&out, 60.0).expect("a document");
+    assert_eq!(tree.warnings, [""; 0]);
+    let nodes = &tree.skeleton.nodes;
+    assert!(
+        nodes
+            .iter()
+            .all(|n| n.kind == NodeKind::Traced && n.copy_of.is_none())
+    );
+    let scan = tree.note.scan.expect("a scan");
+    assert!(
+        (Vector3::from(scan.foot_m) - FAR).norm() < 0.05,
+        "{:?}",
+        scan.foot_m
+    );
+    assert!((0.002..0.005).contains(&scan.noise_m), "{}", scan.noise_m);
+    let metres = tree.note.config.export.metres_per_px;
+    // Where the limbs end, and how thick the trunk is at the height of a breast.
+    let tips = (1..nodes.len() as u32)
+        .map(NodeId)
+        .filter(|n| tree.skeleton.children()[n.index()].is_empty());
+    let tips: Vec<Point3<f64>> = tips.map(|n| nodes[n.index()].position * metres).collect();
+    // A stub stays at a fork of thick limbs in two of twelve such clouds.
+    let counts = TUBES.len()..=TUBES.len() + 1;
+    assert!(counts.contains(&tips.len()), "{tips:?}");
+    for (_, end, _, _) in TUBES {
+        let end = Point3::new(end[0], end[2], -end[1]);
+        let off = tips
+            .iter()
+            .map(|t| (t - end).norm())
+            .fold(f64::INFINITY, f64::min);
+        // The trunk ends as an open ring of 5 cm radius, and its tip anywhere on that.
+        assert!(off < 0.07, "{end}: {off}");
+    }
+    let breast = nodes
+        .iter()
+        .skip(1)
+        .min_by_key(|n| ((n.position.y * metres - 1.3).abs() * 1e6) as u64);
+    let radius = breast.expect("a node").radius * metres;
+    assert!((radius - 0.124).abs() < 0.006, "{radius}");
+    // Each limb leaves at a fork of its own.
+    let forks = tree
+        .skeleton
+        .children()
+        .iter()
+        .filter(|c| c.len() == 2)
+        .count();
+    assert!((TUBES.len() - 1..=TUBES.len()).contains(&forks), "{forks}");
+    // The same again, byte for byte; and the other method.
+    let again = dir.path().join("again");
+    done(&["cloud", name], &again);
+    for file in ["nodes.csv", "tree.glb"] {
+        assert_eq!(
+            fs::read(out.join(file)).expect("file"),
+            fs::read(again.join(file)).expect("file")
+        );
+    }
+    let grown = dir.path().join("colonised");
+    done(&["cloud", name, "--method", "colonisation"], &grown);
+    let height = |dir: &Path| {
+        let tree = Document::read(dir, 60.0).expect("a document");
+        let top = tree
+            .skeleton
+            .nodes
+            .iter()
+            .map(|n| n.position.y)
+            .fold(0.0, f64::max);
+        top * tree.note.config.export.metres_per_px
+    };
+    assert!((height(&grown) - height(&out)).abs() < 0.1);
+    let shown = out.to_str().expect("name");
+    for (arguments, file) in [
+        (vec!["render", shown], "tree.png"),
+        (
+            vec!["animate", shown, "--wind", "4", "--seconds", "2"],
+            "wind.glb",
+        ),
+        (vec!["export", shown, "--format", "ply"], "tree.ply"),
+        (
+            vec!["grow", shown, "--count", "2", "--motion", "none"],
+            "grown",
+        ),
+    ] {
+        done(&arguments, &dir.path().join(file));
+    }
+}
+
+#[test]
+fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [cloud, out] = ["tree.xyz", "tree"].map(|name| dir.path().join(name));
+    tree_cloud(&cloud);
+    done(&["cloud", cloud.to_str().expect("name")], &out);
+    let mut trees = Vec::new();
+    for (format, file) in [("qsm", "qsm.csv"), ("treefile", "tree.txt")] {
+        let path = dir.path().join(file);
+        let said = done(
+            &["export", out.to_str().expect("name"), "--format", format],
+            &path,
+        );
+        assert!(said.contains("order 0: 1 branches, 5."), "{said}");
+        let bytes = fs::read(&path).expect("file");
+        trees.push(read_model(&bytes, &path).expect("a tree").tree);
+    }
+    let [table, treefile] = &trees[..] else {
+        panic!("two trees");
+    };
+    assert_eq!(table.nodes.len(), treefile.nodes.len());
+    for (a, b) in table.nodes.iter().zip(&treefile.nodes) {
+        assert_eq!(a.parent, b.parent);
+        assert!(
+            (a.position - b.position).norm() < 1e-3,
+            "{} {}",
+            a.position,
+            b.position
+        );
+    }
+    let foot = treefile.nodes[0].position;
+    assert!(
+        (foot - Point3::new(FAR.x, FAR.z, -FAR.y)).norm() < 0.05,
+        "{foot}"
+    );
+    // Against the tubes.
+    let text = fs::read_to_string(dir.path().join("qsm.csv")).expect("table");
+    let mut rows = csv::Reader::from_reader(text.as_bytes());
+    let header = rows.headers().expect("header").clone();
+    let column = |name: &str| header.iter().position(|h| h == name).expect("column");
+    let (mut length, mut volume) = (0.0, 0.0);
+    for row in rows.records() {
+        let row = row.expect("row");
+        length += row[column("length")].parse::<f64>().expect("number");
+        volume += row[column("volume")].parse::<f64>().expect("number");
+    }
+    let of_tubes = TUBES.map(|(from, to, wide, thin)| {
+        let length = (Point3::from(to) - Point3::from(from)).norm();
+        (
+            length,
+            std::f64::consts::PI / 3.0 * length * (wide * wide + wide * thin + thin * thin),
+        )
+    });
+    let sums = of_tubes
+        .iter()
+        .fold((0.0, 0.0), |sum, tube| (sum.0 + tube.0, sum.1 + tube.1));
+    assert!(
+        (length / sums.0 - 1.0).abs() < 0.03,
+        "{length} m of {}",
+        sums.0
+    );
+    assert!(
+        (volume / sums.1 - 1.0).abs() < 0.10,
+        "{volume} m3 of {}",
+        sums.1
+    );
+}
+
+#[test]
+fn units_are_taken_as_given() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let points = tree_on_ground(&mut Chance::new(7));
+    let feet = dir.path().join("feet.txt");
+    write_xyz(&feet, &points, 0.3048);
+    let out = dir.path().join("tree");
+    let said = done(
+        &["cloud", feet.to_str().expect("name"), "--unit", "ft"],
+        &out,
+    );
+    let at = said.find(" m high").expect("a height");
+    let height: f64 = said[..at]
+        .rsplit(' ')
+        .next()
+        .expect("a word")
+        .parse()
+        .expect("a number");
+    assert!((4.9..5.1).contains(&height), "{said}");
+}
+
+/// Trees on a slope, not far from each other, each turned and of another size.
+const FEET: [[f64; 2]; 3] = [[0.0, 0.0], [2.6, 0.6], [-0.4, 2.9]];
+const SIZES: [f64; 3] = [1.0, 0.85, 0.7];
+
+/// Their points, and of each the number of its tree; 0 on the ground.
+fn plot(chance: &mut Chance) -> Vec<(Point3<f64>, i32)> {
+    let mut points = Vec::new();
+    for (number, (foot, size)) in (1..).zip(FEET.iter().zip(SIZES)) {
+        let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * f64::from(number));
+        let shift = Vector3::new(foot[0], foot[1], 0.1 * foot[0]) + FAR;
+        let own = points_on(&TUBES, 0.012, 0.003, chance);
+        points.extend(own.iter().map(|p| (turn * (p * size) + shift, number)));
+    }
+    for _ in 0..60_000 {
+        let [x, y] = [chance.between(-3.5, 5.0), chance.between(-3.5, 6.0)];
+        points.push((Point3::new(x, y, 0.1 * x + 0.01 * chance.even()) + FAR, 0));
+    }
+    points
+}
+
+#[test]
+fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [cloud, out, one] = ["plot.xyz", "plot", "one"].map(|name| dir.path().join(name));
+    let truth = plot(&mut Chance::new(7));
+    let points: Vec<Point3<f64>> = truth.iter().map(|t| t.0).collect();
+    write_xyz(&cloud, &points, 1.0);
+    let name = cloud.to_str().expect("name");
+    let said = done(&["cloud", name, "--points"], &out);
+    assert!(said.contains("3 trees;"), "{said}");
+    for tree in ["tree-0001", "tree-0002", "tree-0003", "forest.glb"] {
+        assert!(out.join(tree).exists(), "{tree}: {said}");
+    }
+    // The largest first; heights and places are those of the trees.
+    let forest = ForestDocument::read(&out).expect("a forest");
+    let trees = &forest.forest.trees;
+    assert_eq!(trees.len(), 3);
+    for k in 0..3 {
+        let own = Document::read(&out.join(format!("tree-000{}", k + 1)), 60.0).expect("a tree");
+        let scan = own.note.scan.expect("a scan");
+        let foot = Vector3::from(scan.foot_m) - FAR;
+        assert!(
+            (foot.xy() - Vector2::from(FEET[k])).norm() < 0.08,
+            "{k}: {foot}"
+        );
+        let top = own
+            .skeleton
+            .nodes
+            .iter()
+            .map(|n| n.position.y)
+            .fold(0.0, f64::max);
+        let height_m = top * trees[k].scale * forest.forest.metres_per_px;
+        assert!((height_m - 5.0 * SIZES[k]).abs() < 0.15, "{k}: {height_m}");
+        let apart = trees[k].foot - trees[0].foot;
+        let [x, y] = [0, 1].map(|axis| FEET[k][axis] - FEET[0][axis]);
+        assert!(
+            (apart - Vector3::new(x, 0.1 * x, -y)).norm() < 0.15,
+            "{k}: {apart}"
+        );
+        let on_ground = forest
+            .forest
+            .ground
+            .height_m(Point2::new(trees[k].foot.x, trees[k].foot.z));
+        assert!(
+            (on_ground - trees[k].foot.y).abs() < 0.06,
+            "{k}: {on_ground}"
+        );
+    }
+    // Points of trees are of the right tree.
+    let bytes = fs::read(out.join("points.ply")).expect("points");
+    let rows = &bytes[bytes.len() - 28 * truth.len()..];
+    let (mut right, mut wrong) = (0, 0);
+    for (row, (_, number)) in rows.chunks_exact(28).zip(&truth) {
+        let found = i32::from_le_bytes(row[24..].try_into().expect("four bytes"));
+        right += i32::from(*number > 0 && found == *number);
+        wrong += i32::from(*number > 0 && found != *number && found > 0);
+    }
+    assert!(right > 100 * wrong, "{right}, {wrong}");
+    // One of them.
+    done(&["cloud", name, "--tree", "2"], &one);
+    for file in ["nodes.csv", "tree.glb"] {
+        let [a, b] = [one.join(file), out.join("tree-0002").join(file)];
+        assert_eq!(fs::read(a).expect("file"), fs::read(b).expect("file"));
+    }
+    let film = out.to_str().expect("name");
+    for more in [["--tree", "4"], ["--film", film]] {
+        let none = dir.path().join("none");
+        let output = arborcam(&["cloud", name, more[0], more[1]], &none);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(BAD_USAGE), "{said}");
+        assert!(
+            said.contains(more[0]) && said.lines().count() == 1,
+            "{said}"
+        );
+        assert!(!none.exists());
+    }
+}
+
+/// Each bad cloud gets one line with what is wrong, its status, and nothing is left.
+#[test]
+fn bad_clouds_get_one_line_and_leave_nothing() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let chance = &mut Chance::new(1);
+    let tree = points_on(&TUBES, 0.02, 0.003, chance);
+    let mut crown: Vec<Point3<f64>> = tree.iter().copied().filter(|p| p.z > 2.8).collect();
+    for _ in 0..30_000 {
+        crown.push(Point3::new(
+            chance.between(-2.5, 2.5),
+            chance.between(-2.5, 2.5),
+            0.01 * chance.even(),
+        ));
+    }
+    let flat: Vec<Point3<f64>> = (0..5000)
+        .map(|_| Point3::new(chance.even(), chance.even(), 0.0))
+        .collect();
+    let path = |name: &str| dir.path().join(name);
+    write_xyz(&path("crown.xyz"), &crown, 1.0);
+    write_xyz(&path("flat.xyz"), &flat, 1.0);
+    write_xyz(&path("huge.xyz"), &tree, 0.001);
+    write_xyz(&path("one.xyz"), &tree[..1], 1.0);
+    fs::write(path("nan.xyz"), "nan nan nan\n".repeat(500)).expect("file");
+    fs::write(path("words.txt"), "a tree\n".repeat(50)).expect("file");
+    fs::write(path("empty.las"), "").expect("file");
+    fs::write(path("short.las"), b"LASF and nothing more").expect("file");
+    fs::write(
+        path("more.ply"),
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n\
+        property float z\nend_header\n0 0 0\n1 1 1\n",
+    )
+    .expect("file");
+    fs::write(path("tree.mov"), "x").expect("file");
+    for (name, status, what) in [
+        ("crown.xyz", FAILED, "does not reach the ground"),
+        ("flat.xyz", FAILED, "one plane"),
+        ("huge.xyz", FAILED, "--unit"),
+        ("one.xyz", FAILED, "it holds 1 points"),
+        ("nan.xyz", FAILED, "no coordinate in it is a number"),
+        ("words.txt", FAILED, "line 17"),
+        ("empty.las", FAILED, "cut off"),
+        ("short.las", FAILED, "cut off"),
+        ("more.ply", FAILED, "more than its header says"),
+        ("tree.mov", BAD_USAGE, "its name does not say"),
+        ("absent.ply", NO_INPUT, "cannot read"),
+    ] {
+        let out = path("out");
+        let output = arborcam(&["cloud", path(name).to_str().expect("name")], &out);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(status), "{name}: {said}");
+        assert!(
+            said.contains(what) && said.lines().count() == 1,
+            "{name}: {said}"
+        );
+        assert!(!out.exists(), "{name}");
+    }
+}
+
+/// What the tests above read is what was written.
+#[test]
+fn the_readers_see_every_point() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let path = dir.path().join("tree.xyz");
+    tree_cloud(&path);
+    let lines = fs::read_to_string(&path).expect("file").lines().count();
+    let file = BufReader::new(fs::File::open(&path).expect("file"));
+    let read = read_cloud(file, CloudFormat::Text, None).expect("sound");
+    assert_eq!(read.cloud.points.len(), lines);
+}

@@ -1,0 +1,231 @@
+//! `replay --markers` and `analyze --markers`: coloured markers on branches, and what bad ones get.
+
+use image::{Rgb, RgbImage};
+use nalgebra::{Point2, distance};
+use std::f64::consts::TAU;
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+const FAILED: i32 = 1;
+const BAD_USAGE: i32 = 2;
+const WIDTH: u32 = 320;
+const HEIGHT: u32 = 240;
+const FRAMES: usize = 180;
+const RATE_HZ: f64 = 30.0;
+const FOOT: [f64; 2] = [160.0, 230.0];
+/// Natural frequencies of the trunk and of the branch on it, Hz.
+const TRUNK_HZ: f64 = 1.0;
+const BRANCH_HZ: f64 = 2.3;
+const RED: [f64; 3] = [205.0, 30.0, 38.0];
+
+/// Where the markers are in frame `k`: on the trunk's top and on a branch that it carries, px.
+fn markers_px(k: usize) -> [[f64; 2]; 2] {
+    let time_s = k as f64 / RATE_HZ;
+    let trunk = 0.06 * (TAU * TRUNK_HZ * time_s).cos();
+    let branch = 0.10 * (TAU * BRANCH_HZ * time_s).cos();
+    let top = [FOOT[0] + 120.0 * trunk.sin(), FOOT[1] - 120.0 * trunk.cos()];
+    let turn = trunk + branch + 0.6;
+    [
+        top,
+        [top[0] + 70.0 * turn.sin(), top[1] - 70.0 * turn.cos()],
+    ]
+}
+
+/// Two discs of one colour before a grey wall.
+fn frame(k: usize, colour: [f64; 3]) -> RgbImage {
+    let discs = markers_px(k).map(Point2::from);
+    RgbImage::from_fn(WIDTH, HEIGHT, |u, v| {
+        let here = Point2::new(f64::from(u), f64::from(v));
+        let nearest = discs
+            .iter()
+            .map(|d| distance(d, &here))
+            .fold(f64::INFINITY, f64::min);
+        let share = (5.5 - nearest).clamp(0.0, 1.0);
+        let wall = 110.0 + f64::from((u / 8 * 7 + v / 8 * 5) % 9) * 3.0;
+        Rgb(colour.map(|c| (share * c + (1.0 - share) * wall) as u8))
+    })
+}
+
+/// A folder with a film as pictures, an outline and a file of markers.
+struct Scene {
+    dir: tempfile::TempDir,
+}
+
+impl Scene {
+    fn new(frames: usize, colour: [f64; 3]) -> Self {
+        let scene = Self {
+            dir: tempfile::tempdir().expect("tempdir"),
+        };
+        fs::create_dir(scene.path("film")).expect("folder");
+        for k in 0..frames {
+            let name = format!("film/{k:04}.png");
+            frame(k, colour).save(scene.path(&name)).expect("png");
+        }
+        let corners = [
+            [60, 20],
+            [300, 20],
+            [300, 150],
+            [170, 238],
+            [150, 238],
+            [60, 150],
+        ];
+        scene.write(
+            "outline.json",
+            &format!(
+                r#"{{"frame": 0, "width": {WIDTH}, "height": {HEIGHT}, "polygon_px": {corners:?}}}"#
+            ),
+        );
+        let [a, b] = markers_px(0);
+        scene.markers(&format!(
+            "{}, {}",
+            window("A", a, ""),
+            window("B", b, r#", "parent": "A""#)
+        ));
+        scene
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        fs::write(self.path(name), text).expect("write");
+    }
+
+    fn markers(&self, list: &str) {
+        let text = format!(r#"{{"width": {WIDTH}, "height": {HEIGHT}, "markers": [{list}]}}"#);
+        self.write("markers.json", &text);
+    }
+
+    fn run(&self, arguments: &str) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+        command.current_dir(self.dir.path());
+        command
+            .args(arguments.split_whitespace())
+            .output()
+            .expect("arborcam")
+    }
+
+    /// Replays the film with these markers, without a screen.
+    fn replay(&self, markers: &str, out: &str) -> Output {
+        self.run(&format!(
+            "replay film --fast --headless --outline outline.json --markers {markers} --out {out}"
+        ))
+    }
+
+    fn refused(&self, status: i32, expected: &str) {
+        let output = self.replay("markers.json", "refused");
+        let said = said(&output);
+        let _ = fs::remove_dir_all(self.path("refused"));
+        assert_eq!(output.status.code(), Some(status), "{said}");
+        assert!(said.contains(expected), "{said:?} lacks {expected:?}");
+    }
+}
+
+fn window(name: &str, middle: [f64; 2], more: &str) -> String {
+    let [u, v] = middle.map(|x| x.round() - 9.0);
+    format!(r#"{{"name": "{name}", "window_px": [{u}, {v}, 18, 18]{more}}}"#)
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The branches that `analyze` finds in a capture.
+fn branches(scene: &Scene, arguments: &str) -> Vec<serde_json::Value> {
+    let output = scene.run(&format!("analyze {arguments} --json"));
+    assert!(output.status.success(), "{}", said(&output));
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    all["captures"][0]["branches"]
+        .as_array()
+        .expect("branches")
+        .clone()
+}
+
+#[test]
+fn two_markers_tell_the_frequencies_of_two_branches() {
+    let scene = Scene::new(FRAMES, RED);
+    // So few points make no tree; the markers are there all the same.
+    let output = scene.replay("markers.json", "out");
+    assert_eq!(output.status.code(), Some(FAILED), "{}", said(&output));
+    let tracks = fs::read_to_string(scene.path("out/tracks.csv")).expect("tracks");
+    for (k, truth) in (0..FRAMES).map(|k| (k, markers_px(k))) {
+        for (id, truth) in (1_000_000_000_u32..).zip(truth) {
+            let row = tracks
+                .lines()
+                .find(|l| l.starts_with(&format!("{id},{k},")));
+            let cells: Vec<&str> = row.expect("a row").split(',').collect();
+            let at = Point2::new(cells[3].parse().expect("u"), cells[4].parse().expect("v"));
+            assert!(
+                distance(&at, &truth.into()) < 0.3,
+                "marker {id}, frame {k}: {at}, {truth:?}"
+            );
+        }
+    }
+    let found = branches(&scene, "out --markers");
+    let named: Vec<&str> = found.iter().filter_map(|b| b["branch"].as_str()).collect();
+    assert_eq!(named, ["A", "B"]);
+    assert_eq!(found[1]["parent_id"], found[0]["node_id"]);
+    for (branch, hz) in found.iter().zip([TRUNK_HZ, BRANCH_HZ]) {
+        let peak = branch["spectrum_peak_hz"].as_f64().expect("a peak");
+        assert!((peak - hz).abs() < 0.05, "{peak} for {hz}");
+    }
+    let output = scene.run("analyze out --markers");
+    let table = String::from_utf8_lossy(&output.stdout).into_owned();
+    // The first has a frequency with an interval, and the second nothing but its peak.
+    assert_eq!(table.matches("; peak ").count(), 1, "{table}");
+    // By a file that says that both stand on the foot.
+    let [a, b] = markers_px(0);
+    scene.markers(&format!("{}, {}", window("A", a, ""), window("B", b, "")));
+    let found = branches(&scene, "out --markers=markers.json");
+    assert!(found.iter().all(|b| b["parent_id"].is_null()), "{found:?}");
+    scene.markers(&window("C", a, ""));
+    let output = scene.run("analyze out --markers=markers.json");
+    assert!(
+        said(&output).contains("has no marker C"),
+        "{}",
+        said(&output)
+    );
+}
+
+#[test]
+fn markers_are_found_by_their_hue() {
+    let scene = Scene::new(60, RED);
+    scene.replay("auto", "out");
+    let note = fs::read_to_string(scene.path("out/capture.json")).expect("note");
+    let note: serde_json::Value = serde_json::from_str(&note).expect("JSON");
+    let windows = note["config"]["markers"]["windows"]
+        .as_array()
+        .expect("windows");
+    let names: Vec<&str> = windows.iter().filter_map(|w| w["name"].as_str()).collect();
+    assert_eq!(names, ["m1", "m2"], "from the bottom up");
+}
+
+#[test]
+fn bad_markers_get_a_clear_line() {
+    let scene = Scene::new(4, RED);
+    let [a, b] = markers_px(0);
+    scene.markers(&window("A", [600.0, 20.0], ""));
+    scene.refused(
+        FAILED,
+        "the window of marker A lies off the picture, which is 320x240",
+    );
+    scene.markers(&window("A", [40.0, 200.0], ""));
+    scene.refused(FAILED, "marker A has no colour in its window");
+    scene.markers(&format!(
+        "{}, {}",
+        window("A", a, ""),
+        window("B", [a[0] + 4.0, a[1]], "")
+    ));
+    scene.refused(FAILED, "the windows of markers A and B show the same blob");
+    scene.markers(&window("A", b, r#", "parent": "Z""#));
+    scene.refused(BAD_USAGE, "the parent Z is no marker");
+    scene.write(
+        "markers.json",
+        r#"{"width": 640, "height": 360, "markers": []}"#,
+    );
+    scene.refused(BAD_USAGE, "it holds no markers");
+    let grey = Scene::new(4, [70.0; 3]);
+    grey.refused(FAILED, "the film is grey");
+}
