@@ -30,6 +30,9 @@ from made_films import picture
 
 JPEG_QUALITY = 92
 UNSTEADY_PX = 2.0  # how far a hand is off the line that it follows, at 1500 px width
+# Gaps of a crown that a stroke leads round, px at 640 px width, and the share of the crown that it takes in at least.
+CROWN_GAPS = [41, 61, 91, 131, 181]
+CROWN_SHARE = 0.97
 
 
 def main():
@@ -144,11 +147,17 @@ def crown(seen, branches, camera, low=False):
         tree[v[-1] : int(v[-1] + 0.8 * (foot_v - v[-1])), u[0] + len(u) // 4 : u[-1] - len(u) // 4] = 1
     px = picture.WIDTH / 640
     disc = lambda d: cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (int(d * px) | 1, int(d * px) | 1))
-    pad = int(40 * px)
-    wide = cv2.copyMakeBorder(tree, pad, pad, pad, pad, cv2.BORDER_CONSTANT)
-    wide = cv2.erode(cv2.dilate(wide, disc(41)), disc(27))[pad:-pad, pad:-pad]
-    contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    polygon = cv2.approxPolyDP(max(contours, key=cv2.contourArea), 3.0 * px, True)[:, 0]
+    # Parts of a crown that stand apart are in one stroke.
+    for gap in CROWN_GAPS:
+        pad = int(gap * px)
+        wide = cv2.copyMakeBorder(tree, pad, pad, pad, pad, cv2.BORDER_CONSTANT)
+        wide = cv2.erode(cv2.dilate(wide, disc(gap)), disc(gap - 14))[pad:-pad, pad:-pad]
+        contours, _ = cv2.findContours(wide, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+        largest = max(contours, key=cv2.contourArea)
+        inside = cv2.fillPoly(np.zeros_like(tree), [largest], 1)
+        if (tree & inside).sum() >= CROWN_SHARE * tree.sum():
+            break
+    polygon = cv2.approxPolyDP(largest, 3.0 * px, True)[:, 0]
     return {"width": picture.WIDTH, "height": picture.HEIGHT, "polygon_px": polygon.tolist()}
 
 

@@ -45,43 +45,36 @@ fn run_with(
     seeds: std::ops::Range<u64>,
     drive: Drive,
     filming: &Filming,
-    change: impl Fn(&mut MadeTree),
+    change: impl Fn(&mut MadeTree) + Sync,
 ) -> Found {
-    let mut found = Found::default();
-    for seed in seeds {
-        let mut tree = MadeTree::new(seed, drive, filming);
-        change(&mut tree);
-        let analysis = analyse(
-            &tree.skeleton,
-            &tree.film,
-            &Dynamics::default(),
-            Depth::Full,
-            &CancelToken::new(),
-        );
-        let wind = analysis
-            .onset
-            .is_some_and(|o| o.excitation == Excitation::Wind);
-        found.trees += 1;
-        found.told += usize::from(wind == matches!(drive, Drive::Wind));
-        found.branches += tree.branches.len();
-        for (k, b) in tree.branches.iter().enumerate() {
-            let Ok(sway) = &analysis.sway[k + 1] else {
-                continue;
-            };
-            let f = sway.frequency_hz;
-            found.frequency.push((
-                (f.value / b.frequency_hz - 1.0).abs(),
-                f.holds(b.frequency_hz),
-            ));
-            if let Some(d) = sway.damping_ratio {
+    // Not all by one thread: the longest test would keep the others' processors waiting.
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let seeds: Vec<u64> = seeds.collect();
+    let parts = std::thread::scope(|scope| {
+        let mut running = Vec::new();
+        for part in seeds.chunks(seeds.len().div_ceil(threads)) {
+            let change = &change;
+            running.push(scope.spawn(move || {
+                let mut found = Found::default();
+                for seed in part {
+                    let mut tree = MadeTree::new(*seed, drive, filming);
+                    change(&mut tree);
+                    found.add(&tree, drive);
+                }
                 found
-                    .damping
-                    .push(((d.value / b.damping - 1.0).abs(), d.holds(b.damping)));
-            }
-            if k == 0 {
-                found.trunk_hz.push((f.value - b.frequency_hz).abs());
-            }
+            }));
         }
+        let parts = running.into_iter().map(|part| part.join().expect("a part"));
+        parts.collect::<Vec<_>>()
+    });
+    let mut found = Found::default();
+    for part in parts {
+        found.trees += part.trees;
+        found.told += part.told;
+        found.branches += part.branches;
+        found.frequency.extend(part.frequency);
+        found.damping.extend(part.damping);
+        found.trunk_hz.extend(part.trunk_hz);
     }
     found
 }
@@ -102,6 +95,38 @@ fn coverage(all: &[(f64, bool)]) -> f64 {
 }
 
 impl Found {
+    /// Adds what comes out for one tree.
+    fn add(&mut self, tree: &MadeTree, drive: Drive) {
+        let analysis = analyse(
+            &tree.skeleton,
+            &tree.film,
+            &Dynamics::default(),
+            Depth::Full,
+            &CancelToken::new(),
+        );
+        let wind = analysis
+            .onset
+            .is_some_and(|o| o.excitation == Excitation::Wind);
+        self.trees += 1;
+        self.told += usize::from(wind == matches!(drive, Drive::Wind));
+        self.branches += tree.branches.len();
+        for (k, b) in tree.branches.iter().enumerate() {
+            let Ok(sway) = &analysis.sway[k + 1] else {
+                continue;
+            };
+            let f = sway.frequency_hz;
+            let error = (f.value / b.frequency_hz - 1.0).abs();
+            self.frequency.push((error, f.holds(b.frequency_hz)));
+            if let Some(d) = sway.damping_ratio {
+                let error = (d.value / b.damping - 1.0).abs();
+                self.damping.push((error, d.holds(b.damping)));
+            }
+            if k == 0 {
+                self.trunk_hz.push((f.value - b.frequency_hz).abs());
+            }
+        }
+    }
+
     fn print(&self, name: &str) {
         let e = |q| 100.0 * quantile(errors(&self.frequency), q);
         let d = |q| 100.0 * quantile(errors(&self.damping), q);
