@@ -36,7 +36,7 @@ const TWIG_RADII_MM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 #[derive(Debug, Args)]
 pub struct CloudArgs {
-    /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc).
+    /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc, .csv, .pts).
     file: PathBuf,
     /// Folder for the tree, or for several trees and their scene. It must not exist, and appears
     /// when it is complete.
@@ -167,7 +167,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         unused::note("--points", "one tree is written");
     }
     let tree = args.chosen(found, number)?;
-    let drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
+    let mut drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
     if stop.while_writing().load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
@@ -175,20 +175,15 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     match args.film_on(&tree, &scan, &drawn)? {
         Some(film) => {
             let swaying = film.branches();
+            if let Some(warning) = film.lean_warning() {
+                eprint_line(&format!("arborcam: warning: {warning}"));
+                drawn.note.warnings.push(warning);
+            }
             drawn.write_with_film(&args.out, &film)?;
             eprint_line(&format!(
                 "{}; {swaying} of {branches} branches carry its frequencies",
                 lies_on(&film.fit)
             ));
-            if let Some(lean) = film.fit.lean.filter(|_| film.fit.is_rest_unsure()) {
-                eprint_line(&format!(
-                    "arborcam: warning: the tree leans in the film, or the camera was rolled, by {:.1} degrees; \
-                     places at rest may be off by {:.1} % of the height. Hang a tag upright beside \
-                     the trunk (--tag)",
-                    lean.angle.to_degrees(),
-                    100.0 * lean.rest_off_hi
-                ));
-            }
         }
         None => drop(drawn.write(&args.out)?),
     }
@@ -261,7 +256,7 @@ impl CloudArgs {
         let count = found.trees.len();
         if number > count as u64 {
             let trees = if count == 1 {
-                "one tree stands"
+                "tree stands"
             } else {
                 "trees stand"
             };
@@ -316,7 +311,7 @@ impl CloudArgs {
         let fit = fit.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
-                None => "it is not found from where it was filmed; give three places in both with --pairs",
+                None => "it is not found from where it was filmed; if it is of this tree, give three places in both with --pairs",
             };
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;
@@ -328,7 +323,8 @@ impl CloudArgs {
             &filmed_points(&film)?,
             &fit.registration,
         );
-        Ok(Some(FilmOnScan { fit, sway }))
+        let has_tag = film.note.tag.is_some();
+        Ok(Some(FilmOnScan { fit, sway, has_tag }))
     }
 }
 

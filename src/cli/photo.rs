@@ -6,6 +6,7 @@ mod kept;
 mod picture;
 
 use super::command_error::CommandError;
+use super::common::parse_within;
 use super::example::Example;
 use super::forest::write_forest;
 use super::grow::tree_name;
@@ -59,7 +60,7 @@ pub struct PhotoArgs {
     attractors: Attractors,
     /// The row of the horizon, px of the photograph, by which trees that stand farther away are
     /// larger than they look; of several trees only. By default the middle row.
-    #[arg(long, value_name = "ROW")]
+    #[arg(long, value_name = "ROW", value_parser = parse_row, allow_negative_numbers = true)]
     horizon: Option<f64>,
     /// Seed of the random numbers; the same seed gives the same tree.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -159,6 +160,11 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     if args.draw {
         drawn = draw::on_screen(&shown, drawn, options, &args.out)?;
     }
+    if args.horizon.is_some() && drawn.len() < 2 {
+        return Err(CommandError::BadUsage(anyhow!(
+            "--horizon is for several trees; draw each with its own --tree"
+        )));
+    }
     let stop = Stop::on_signals()?;
     let like = args.like()?;
     let seen = seen(&shown, &drawn, options)?;
@@ -194,6 +200,11 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         None => write_single(&args.out, trees, is_stopped),
         Some(forest) => write_all(&args.out, trees, forest, is_stopped),
     }
+}
+
+/// Parses a row of the photograph, px; the horizon may lie above the picture.
+fn parse_row(text: &str) -> Result<f64, String> {
+    parse_within(text, -1e5..=1e5, "give a row of the photograph, px")
 }
 
 impl PhotoArgs {
@@ -272,11 +283,16 @@ fn refuse_unlikely(
         if let Some(found) = tree.found.filter(|found| !found.is_likely()) {
             let missing = Missing::of(own);
             return Err(CommandError::Failed(anyhow!(
-                "{}: {} is found without a stroke, but is right with a chance of {:.0} % only; draw with {}, or on \
-                 the screen with --draw",
+                "{}: {} is found without a stroke, but is right with a chance of {:.0} % only{}; draw with {}, or \
+                 on the screen with --draw",
                 shown.name,
                 missing.what(),
                 100.0 * found.chance(),
+                if tree.has_colour {
+                    ""
+                } else {
+                    ", for the picture is grey"
+                },
                 missing.options(),
             )));
         }
@@ -339,6 +355,12 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
     if !tree.has_colour {
         warnings.push(
             "the photograph has no colours, by which leaves are known: the tree is taken to be bare"
+                .to_owned(),
+        );
+    }
+    if tree.seen.may_have_red_leaves {
+        warnings.push(
+            "half of the crown is red, and leaves were looked for as green: if these are leaves, give --foliage red"
                 .to_owned(),
         );
     }

@@ -18,6 +18,11 @@ pub enum CloudError {
          missing; scan the trunk more finely, or cut one tree out of the scan"
     )]
     Apart { share_percent: f64 },
-    #[error("the tree would be {height_m} m high; give the unit of the file with --unit")]
+    #[error(
+        "what stands in it is {height_m:.2} m high and reaches {width_m:.1} m to the side, as ground does and \
+         no tree; give a cloud of a tree that stands along z"
+    )]
+    Low { height_m: f64, width_m: f64 },
+    #[error("the tree would be {height_m:.0} m high; give the unit of the file with --unit")]
     OddSize { height_m: f64 },
 }

@@ -54,6 +54,9 @@ const MOST_BRANCHES: usize = 4000;
 const LONGER: f64 = 1.2;
 /// Heights of trees, m.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.05..=200.0;
+/// What reaches farther to the side than this share of its height upwards is ground, and no tree: crowns are
+/// twice as wide as high at most.
+const LEAST_HEIGHT: f64 = 0.2;
 
 /// How the middle lines are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -224,6 +227,14 @@ fn tree_of(
         .map(|n| n.position.z)
         .fold(f64::NEG_INFINITY, f64::max);
     figures.height_m = highest - first.position.z;
+    let from_foot = |n: &CloudNode| (n.position - first.position).xy().norm();
+    let width_m = nodes.iter().map(from_foot).fold(0.0, f64::max);
+    if figures.height_m < LEAST_HEIGHT * width_m {
+        return Err(CloudError::Low {
+            height_m: figures.height_m,
+            width_m,
+        });
+    }
     if !HEIGHTS_M.contains(&figures.height_m) {
         return Err(CloudError::OddSize {
             height_m: figures.height_m,

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
     /// Nothing is ever overwritten unasked.
-    #[error("{} exists already; choose another folder, or remove it first", .path.display())]
+    #[error("{} exists already; choose another name, or remove it first", .path.display())]
     Exists { path: PathBuf },
     /// Some part of the path is a file.
     #[error("{} cannot be a folder: part of the path is a file or no name; choose another", .path.display())]

@@ -15,7 +15,7 @@ pub enum ImportError {
     /// Its bytes cannot be read.
     #[error("it cannot be read: {why}; give another file")]
     Unreadable { why: String },
-    #[error("it holds no strokes; draw the trunk and the branches as lines or paths")]
+    #[error("it holds no strokes; draw trunk, branches or a crown as lines or paths")]
     NoStrokes,
     #[error("its line is open, as one along a branch is; draw a closed line round the crown")]
     OpenCrown,

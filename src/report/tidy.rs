@@ -15,7 +15,8 @@ const BEFORE_NOTES: &str = "tree_branch,capture,captured_at";
 const BEFORE_SWAY: &str = "node_id,branch,parent_id,level,order,points,matched_by,off,excitation";
 const AFTER_SWAY: &str = "amplitude_deg,amplitude_px,amplitude_m,unidentified,\
                           frequency_to_first,frequency_to_first_lo,frequency_to_first_hi,\
-                          damping_to_first,damping_to_first_lo,damping_to_first_hi";
+                          damping_to_first,damping_to_first_lo,damping_to_first_hi,\
+                          spectrum_peak_hz,half_power_damping";
 /// What a note's column begins with, so that no note is taken for a column of ours.
 const NOTE: &str = "note_";
 
@@ -45,6 +46,9 @@ pub fn csv(studies: &[Study], comparison: Option<&Comparison>) -> Result<Vec<u8>
             push_branch(&mut table, study, branch, tree.matches[k][j]);
             push_sway(&mut table, study, branch);
             push_changes(&mut table, first, branch.known());
+            let reference = branch.reference;
+            table.number(reference.map_or(f64::NAN, |r| r.peak_hz), 4);
+            table.number(reference.map_or(f64::NAN, |r| r.damping_ratio), 4);
             table.end_row()?;
         }
     }

@@ -603,11 +603,11 @@ impl ModelThread {
         }
         let seen = self.shared.counts.seen.load(Ordering::Relaxed);
         let written = match self.job.out.clone() {
-            Some(out) if seen > 0 && self.file.is_some() => self
+            Some(out) if seen > 0 && self.file.is_some() && !self.shared.is_refused() => self
                 .write_capture(&out)
                 .map_err(|e| self.shared.fail_at_end(e))
                 .ok(),
-            // Without a single frame, or without a log, there is nothing to keep.
+            // Without a single frame, or without a log, there is nothing to keep, nor of what was asked for in vain.
             _ => {
                 if let Some(unfinished) = self.unfinished.take() {
                     unfinished.remove();

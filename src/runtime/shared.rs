@@ -225,6 +225,12 @@ impl Shared {
             .get_or_insert(failure);
     }
 
+    /// Whether what was asked for turned out wrong with the first frames.
+    pub fn is_refused(&self) -> bool {
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        matches!(*failure, Some(Failure::Markers(_)))
+    }
+
     /// The capture could not be written: the user must read where it is. An earlier failure becomes
     /// a warning beside it.
     pub fn fail_at_end(&self, failure: Failure) {

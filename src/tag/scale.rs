@@ -89,9 +89,19 @@ impl Shape {
         is_sound.then(|| Self {
             middle_px: homography.apply(Point2::origin()),
             side_px: long,
-            roll_deg: (-down.x).atan2(down.y).to_degrees(),
+            roll_deg: upright_deg((-down.x).atan2(down.y).to_degrees()),
             foreshortened: short / long,
         })
+    }
+}
+
+/// A roll within 90 degrees to either side: a tag that hangs upside down is upright, too. Printouts differ in
+/// which side is up, and no camera films upside down.
+fn upright_deg(roll_deg: f64) -> f64 {
+    match roll_deg {
+        roll if roll > 90.0 => roll - 180.0,
+        roll if roll < -90.0 => roll + 180.0,
+        roll => roll,
     }
 }
 
@@ -283,6 +293,26 @@ mod tests {
         assert!(off_deg < 2.0 * scale.roll_sd_deg, "{scale:?}");
         assert!(scale.roll_sd_deg < 0.3, "{scale:?}");
         assert!((scale.frames, scale.moves_px) == (4, 0.0));
+    }
+
+    /// Printouts of the same tag differ in which side is up.
+    #[test]
+    fn a_tag_that_hangs_upside_down_is_upright() {
+        for turned_deg in [7.0, 187.0, -173.0] {
+            let view = View {
+                focal_px: 900.0,
+                middle_m: Vector3::new(0.0, 0.0, 3.0),
+                turned: Vector3::new(0.0, 0.0, f64::to_radians(turned_deg)),
+                size_m: 0.2,
+            };
+            let tags = find_tags(&picture(&view, 3, 5));
+            let seen = TagSeen::of(&tags[0]).expect("a square");
+            let scale = scale_of(&[seen; 4], 0.2).expect("a scale");
+            assert!(
+                (scale.roll_deg - 7.0).abs() < 1.0,
+                "{turned_deg}: {scale:?}"
+            );
+        }
     }
 
     #[test]

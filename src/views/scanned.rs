@@ -17,12 +17,29 @@ pub struct FilmOnScan {
     pub fit: FilmFit,
     /// By node index of the scanned tree.
     pub sway: Vec<Swaying>,
+    /// A tag was seen in the film.
+    pub has_tag: bool,
 }
 
 impl FilmOnScan {
     /// Pieces of branches that carry a filmed frequency.
     pub fn branches(&self) -> usize {
         self.sway.iter().filter(|s| s.is_ok()).count()
+    }
+
+    /// The warning where the places of the tree at rest are less sure than where it was filmed.
+    pub fn lean_warning(&self) -> Option<String> {
+        let lean = self.fit.lean.filter(|_| self.fit.is_rest_unsure())?;
+        let advice = match self.has_tag {
+            true => "",
+            false => "; hang a tag upright beside the trunk (--tag)",
+        };
+        Some(format!(
+            "the tree leans in the film, or the camera was rolled, by {:.1} degrees; places at rest may be off by \
+             {:.1} % of the height{advice}",
+            lean.angle.to_degrees(),
+            100.0 * lean.rest_off_hi
+        ))
     }
 
     fn note(&self) -> ScanFilmNote {

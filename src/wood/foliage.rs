@@ -76,6 +76,14 @@ impl LeafColour {
     }
 }
 
+/// Share of a crown (`region`, not 0 inside) that has the colour of leaves.
+pub fn share_of(picture: &Rgb, region: &[u8], colour: LeafColour) -> f64 {
+    let inside = (0..region.len()).filter(|i| region[*i] != 0);
+    let has_colour = |i: &usize| colour.score(&colour_at(picture, *i)) > LEAST_SCORE;
+    let coloured = inside.clone().filter(has_colour).count();
+    coloured as f64 / inside.count().max(1) as f64
+}
+
 /// What is known of a crown before its colours are looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct InCrown<'a> {
@@ -271,6 +279,14 @@ mod tests {
     }
 
     /// Leaves above a lawn that is nearly as green: what of the lawn lies within the crown is none of them.
+    #[test]
+    fn red_leaves_have_the_share_of_the_crown_that_they_have() {
+        let region = vec![255; 80 * 60];
+        let share = |colour| share_of(&halves([150, 50, 40]), &region, colour);
+        assert!((share(LeafColour::Red) - 0.5).abs() < 0.02);
+        assert!(share(LeafColour::Green) < 0.01);
+    }
+
     #[test]
     fn a_lawn_that_reaches_into_the_crown_is_no_leaf() {
         let size = Size::new(80, 80);

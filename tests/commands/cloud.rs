@@ -395,12 +395,19 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
     let flat: Vec<Point3<f64>> = (0..5000)
         .map(|_| Point3::new(chance.even(), chance.even(), 0.0))
         .collect();
+    let mut ground: Vec<Point3<f64>> = Vec::new();
+    for _ in 0..20_000 {
+        let [u, v] = [chance.between(-10.0, 10.0), chance.between(-10.0, 10.0)];
+        ground.push(Point3::new(u, v, chance.between(-0.15, 0.15)));
+    }
     let path = |name: &str| dir.path().join(name);
     write_xyz(&path("crown.xyz"), &crown, 1.0);
+    write_xyz(&path("ground.xyz"), &ground, 1.0);
     write_xyz(&path("flat.xyz"), &flat, 1.0);
     write_xyz(&path("huge.xyz"), &tree, 0.001);
     write_xyz(&path("one.xyz"), &tree[..1], 1.0);
     fs::write(path("nan.xyz"), "nan nan nan\n".repeat(500)).expect("file");
+    fs::write(path("comma.xyz"), "1,5;2,5;3,5\n".repeat(500)).expect("file");
     fs::write(path("words.txt"), "a tree\n".repeat(50)).expect("file");
     fs::write(path("empty.las"), "").expect("file");
     fs::write(path("short.las"), b"LASF and nothing more").expect("file");
@@ -414,6 +421,8 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
     for (name, status, what) in [
         ("crown.xyz", FAILED, "does not reach the ground"),
         ("flat.xyz", FAILED, "one plane"),
+        ("ground.xyz", FAILED, "as ground does"),
+        ("comma.xyz", FAILED, "line 1 has semicolons and commas"),
         ("huge.xyz", FAILED, "--unit"),
         ("one.xyz", FAILED, "it holds 1 points"),
         ("nan.xyz", FAILED, "no coordinate in it is a number"),

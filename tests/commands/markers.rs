@@ -117,8 +117,8 @@ impl Scene {
     fn refused(&self, status: i32, expected: &str) {
         let output = self.replay("markers.json", "refused");
         let said = said(&output);
-        let _ = fs::remove_dir_all(self.path("refused"));
         assert_eq!(output.status.code(), Some(status), "{said}");
+        assert!(!self.path("refused").exists(), "{said}");
         assert!(said.contains(expected), "{said:?} lacks {expected:?}");
     }
 }

@@ -96,7 +96,7 @@ impl StrokeFile {
             return Ok(scale);
         }
         Err(of_another_picture(
-            option,
+            &format!("{option} {}", self.name),
             self.sketch.size,
             shown.full_size,
         ))

@@ -27,7 +27,7 @@ function describe(data) {
   at("title").textContent = document.title = data.title;
   if (data.forest) {
     const { trees, templates } = data.forest;
-    at("about").textContent = `${trees} ${trees === 1 ? "tree" : "trees"} of ${templates} grown from ${data.source}`;
+    at("about").textContent = `${trees} ${trees === 1 ? "tree" : "trees"} of ${templates} from ${data.source}`;
     at("made").textContent = `${data.software}.`;
     document.body.classList.add("forest");
     return;

@@ -41,7 +41,7 @@ impl CloudFormat {
             "xyz" | "txt" | "asc" | "csv" | "pts" => Ok(Self::Text),
             _ => Err(ImportError::unsupported(
                 "its name does not say what it is",
-                "give a file .las, .laz, .e57, .ply, .pcd, .xyz, .txt or .asc",
+                "give a file .las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc, .csv or .pts",
             )),
         }
     }

@@ -10,7 +10,7 @@ const LONGEST_LINE: u64 = 4096;
 const MOST_HEADER_LINES: usize = 16;
 
 /// Reads the first three numbers of every line; they are parted by white space, commas or
-/// semicolons. Lines that begin with `#` or `//` do not count.
+/// semicolons, not by both of these. Lines that begin with `#` or `//` do not count.
 ///
 /// # Errors
 /// A line is none of a point, or too long.
@@ -27,6 +27,11 @@ pub(super) fn read(mut input: impl BufRead, points: &mut Points) -> Result<(), I
         let own = line.trim_ascii();
         if own.is_empty() || own.starts_with(b"#") || own.starts_with(b"//") {
             continue;
+        }
+        if own.contains(&b';') && own.contains(&b',') {
+            return Err(ImportError::bad_format(format!(
+                "line {number} has semicolons and commas; write numbers with decimal points"
+            )));
         }
         if let Some([x, y, z]) = place(own) {
             points.push(x, y, z)?;

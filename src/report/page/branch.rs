@@ -14,7 +14,7 @@ const LEAST_HZ: f64 = 2.0;
 pub fn branch_part(study: &Study, branch: &Branch) -> String {
     let of = branch
         .parent
-        .map_or("the trunk".into(), |p| format!("carried by {p}"));
+        .map_or("on the foot".into(), |p| format!("carried by {p}"));
     let id = escaped(&anchor(study, branch));
     let head = format!("Branch {}, {}, {of}", branch.name, branch.piece);
     match branch.sway {

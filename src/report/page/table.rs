@@ -45,10 +45,15 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
     };
     let place = [branch.level.to_string(), parent, branch.points.to_string()];
     let first = cells("td", "n", &[name, branch.piece.clone()]) + &cells("td", "n less", &place);
+    let reference = [
+        number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2),
+        number(branch.reference.map_or(f64::NAN, |r| r.damping_ratio), 3),
+    ];
+    let reference = cells("td", "n less", &reference);
     let rest = match branch.sway {
         Err(_) => format!(
             "<td class=\"why\" colspan=\"{}\"><span>none: {}</span></td>",
-            columns - 5,
+            columns - 7,
             branch.why().unwrap_or_default()
         ),
         Ok(sway) => {
@@ -62,14 +67,10 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
             if study.metres_per_px > 0.0 {
                 rest.push(number(branch.amplitude_px() * study.metres_per_px, 4));
             }
-            let reference = [
-                number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2),
-                number(branch.reference.map_or(f64::NAN, |r| r.damping_ratio), 3),
-            ];
-            cells("td", "n", &rest) + &cells("td", "n less", &reference)
+            cells("td", "n", &rest)
         }
     };
-    format!("<tr>{first}{rest}</tr>")
+    format!("<tr>{first}{rest}{reference}</tr>")
 }
 
 /// The name of a branch's part within the page.

@@ -157,8 +157,8 @@ impl Sheet {
             state: State::default(),
             name: session.name().to_owned(),
             picture: session.picture(),
+            before: steps_to(&trees),
             trees,
-            before: Vec::new(),
             looking: None,
             is_warned: false,
         };
@@ -390,11 +390,29 @@ impl Sheet {
                     let percent = 100.0 * certainty;
                     format!("; found without strokes, right with a chance of {percent:.0} %")
                 });
-                format!("{look}, wood with {tips} tips{sure}. Enter accepts.")
+                let times = if found.is_likely { "" } else { " twice" };
+                format!("Enter{times} accepts: {look}, wood with {tips} tips{sure}.")
             }
             Err(why) => why.clone(),
         }
     }
+}
+
+/// How trees that are there already were drawn, stroke by stroke of the last one, so that these can be taken
+/// back as well.
+fn steps_to(trees: &[Tree]) -> Vec<Vec<Tree>> {
+    let mut steps = Vec::new();
+    let Some((last, others)) = trees.split_last() else {
+        return steps;
+    };
+    let mut strokes = last.strokes.clone();
+    while strokes.branches_px.pop().is_some() || !std::mem::take(&mut strokes.crown_px).is_empty() {
+        let mut step = others.to_vec();
+        step.push(Tree::of(strokes.clone()));
+        steps.push(step);
+    }
+    steps.reverse();
+    steps
 }
 
 /// What a finished drawing changes.

@@ -85,9 +85,14 @@ struct Screen {
 
 impl Screen {
     fn new(width: u16, height: u16) -> Self {
+        Self::begun(width, height, Vec::new())
+    }
+
+    /// With strokes of files.
+    fn begun(width: u16, height: u16, strokes: Vec<TreeStrokes>) -> Self {
         let puppet = Puppet::default();
         let mut screen = Self {
-            sheet: Sheet::new(&puppet, Vec::new()),
+            sheet: Sheet::new(&puppet, strokes),
             puppet,
             preview: Preview::new(Graphics::characters(Depth::None)),
             terminal: Terminal::new(TestBackend::new(width, height)).expect("terminal"),
@@ -199,6 +204,22 @@ fn undo_takes_strokes_back_and_needs_no_new_look() {
         "{}",
         screen.shown()
     );
+}
+
+#[test]
+fn strokes_of_files_can_be_taken_back_too() {
+    let given = TreeStrokes {
+        crown_px: CROWN.map(Point2::from).to_vec(),
+        branches_px: vec![TRUNK.map(Point2::from).to_vec()],
+    };
+    let mut screen = Screen::begun(80, 24, vec![given]);
+    assert_eq!(screen.press(KeyCode::Char('u')), Next::Look);
+    screen.press(KeyCode::Char('u'));
+    screen.press(KeyCode::Char('u'));
+    let shown = screen.shown();
+    assert!(shown.contains("nothing to undo"), "{shown}");
+    let last = screen.puppet.looked.last().expect("a look");
+    assert!(last.crown_px.is_empty() && last.branches_px.is_empty());
 }
 
 #[test]
