@@ -336,7 +336,7 @@ fn lies_on(fit: &FilmFit) -> String {
             100.0 * off
         ),
         None => format!(
-            "the film lies on the scan to {:.1} % of its height",
+            "the film lies on the scan, where the pairs agree within {:.1} % of its height",
             100.0 * fit.registration.miss
         ),
     }

@@ -8,6 +8,7 @@ use serde::Deserialize;
 
 /// A line in a picture of the given size.
 #[derive(Clone, Debug, Deserialize)]
+#[serde(expecting = "an object with width, height and polyline_px")]
 pub struct Line {
     width: u32,
     height: u32,

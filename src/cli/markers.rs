@@ -87,7 +87,10 @@ impl MarkerSpec {
 
 /// A file of markers.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "an object with width, height and markers"
+)]
 pub struct MarkerFile {
     /// Of the picture that the windows were drawn in, px.
     width: u32,

@@ -54,8 +54,8 @@ const MOST_BRANCHES: usize = 4000;
 const LONGER: f64 = 1.2;
 /// Heights of trees, m.
 const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.05..=200.0;
-/// What reaches farther to the side than this share of its height upwards is ground, and no tree: crowns are
-/// twice as wide as high at most.
+/// What is lower than this share of how far it reaches to the side is ground, and no tree: crowns are twice as
+/// wide as high at most.
 const LEAST_HEIGHT: f64 = 0.2;
 
 /// How the middle lines are found.

@@ -9,7 +9,10 @@ use nalgebra::Point2;
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(
+    deny_unknown_fields,
+    expecting = "an object with width, height and lines"
+)]
 struct SketchFile {
     width: u32,
     height: u32,

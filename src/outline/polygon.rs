@@ -10,6 +10,7 @@ use serde::Deserialize;
 /// The outline file of the contract: `{"frame": 0, "width": W, "height": H, "polygon_px": [[u, v],
 /// ...]}`.
 #[derive(Debug, Deserialize)]
+#[serde(expecting = "an object with width, height and polygon_px")]
 pub struct PolygonFile {
     pub width: u32,
     pub height: u32,
