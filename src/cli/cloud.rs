@@ -311,7 +311,10 @@ impl CloudArgs {
         let fit = fit.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
-                None => "it is not found from where it was filmed; if it is of this tree, give three places in both with --pairs",
+                None => {
+                    "it is not found from where it was filmed; if it is of this tree, give three places in both \
+                     with --pairs"
+                }
             };
             CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
         })?;

@@ -188,7 +188,8 @@ impl AutoOutline {
 
     fn reduced_region(&self) -> opencv::Result<Option<Outline>> {
         let size = self.reduced;
-        let Some(mut mask) = self.moving_tree() else {
+        let deviation = self.motion();
+        let Some(mut mask) = self.moving_tree(&deviation) else {
             return Ok(None);
         };
         region::without_specks(size, &mut mask, SPECK_GAP_PX, SPECK_SHARE)?;
@@ -210,8 +211,7 @@ impl AutoOutline {
         }
         let outline = region::close_to_one(size, &wide, 0)?;
         let first = self.kept.first().map(|kept| &kept.picture);
-        let other_foot_px =
-            first.and_then(|first| feet::second_foot(first, &one.mask, &self.motion()));
+        let other_foot_px = first.and_then(|first| feet::second_foot(first, &one.mask, &deviation));
         Ok(outline
             .filter(|o| o.coverage() >= LEAST_COVERAGE)
             .map(|outline| Outline {
@@ -222,9 +222,9 @@ impl AutoOutline {
 
     /// The pixels that move and were tree in the first picture, 255 there and 0 elsewhere; `None`
     /// if hardly anything moves.
-    fn moving_tree(&self) -> Option<Vec<u8>> {
+    fn moving_tree(&self, deviation: &[f32]) -> Option<Vec<u8>> {
         let first = self.kept.first().filter(|_| self.count >= 2.0)?;
-        let moving = self.moving();
+        let moving = self.moving(deviation);
         let count = moving.iter().filter(|m| **m).count();
         if (count as f64) < LEAST_MOVING * self.reduced.area() as f64 {
             return None;
@@ -238,9 +238,8 @@ impl AutoOutline {
     }
 
     /// Which pixels change more than noise does.
-    fn moving(&self) -> Vec<bool> {
-        let deviation = self.motion();
-        let mut sorted = deviation.clone();
+    fn moving(&self, deviation: &[f32]) -> Vec<bool> {
+        let mut sorted = deviation.to_vec();
         let quarter = sorted.len() / 4;
         let quiet = *sorted.select_nth_unstable_by(quarter, f32::total_cmp).1;
         let threshold = (ABOVE_QUIET * quiet).max(ABOVE_GREY);
@@ -249,7 +248,7 @@ impl AutoOutline {
         let columns = border..size.width.saturating_sub(border);
         let rows = border..size.height.saturating_sub(border);
         let mut moving = Vec::with_capacity(deviation.len());
-        for (i, d) in (0..).zip(deviation) {
+        for (i, d) in (0..).zip(deviation.iter().copied()) {
             let inside = columns.contains(&(i % size.width)) && rows.contains(&(i / size.width));
             moving.push(inside && d > threshold);
         }
