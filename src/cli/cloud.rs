@@ -8,7 +8,7 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
-use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud};
+use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud, verdict};
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::refuse_taken;
@@ -133,6 +133,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let config = scan_defaults().layered(args.config.as_deref(), |config| {
         config.wood.seed = args.seed;
     })?;
+    let film = args.film.as_deref().map(Document::tree).transpose()?;
     let CloudRead {
         cloud,
         units_in_file,
@@ -166,14 +167,16 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     if args.points {
         unused::note("--points", "one tree is written");
     }
+    let holds_ground = found.figures.ground > 0;
     let tree = args.chosen(found, number)?;
     let mut drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
     if stop.while_writing().load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
     let branches = drawn.skeleton.measured_branches().count();
-    match args.film_on(&tree, &scan, &drawn)? {
-        Some(film) => {
+    match &film {
+        Some(capture) => {
+            let film = args.laid_on(capture, &tree, &scan, &drawn)?;
             let swaying = film.branches();
             if let Some(warning) = film.lean_warning() {
                 eprint_line(&format!("arborcam: warning: {warning}"));
@@ -186,6 +189,11 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
             ));
         }
         None => drop(drawn.write(&args.out)?),
+    }
+    if !holds_ground {
+        eprint_line(
+            "arborcam: note: the cloud holds no ground; the lowest wood counts as the foot",
+        );
     }
     print_summary(&args.out, &tree, branches);
     scan.warn_of_tall(&tree);
@@ -283,20 +291,17 @@ impl CloudArgs {
         )))
     }
 
-    /// The film on the scan, if there is one.
+    /// The film on the scan.
     ///
     /// # Errors
-    /// It cannot be read, or does not lie on the scan.
-    fn film_on(
+    /// It does not lie on the scan.
+    fn laid_on(
         &self,
+        film: &Document,
         tree: &CloudTree,
         scan: &Scan,
         document: &DrawnTree,
-    ) -> Result<Option<FilmOnScan>, CommandError> {
-        let Some(dir) = &self.film else {
-            return Ok(None);
-        };
-        let film = Document::tree(dir)?;
+    ) -> Result<FilmOnScan, CommandError> {
         let foot = tree
             .nodes
             .first()
@@ -307,7 +312,7 @@ impl CloudArgs {
             pair.scan = scan.metres(&pair.scan) - foot;
         }
         let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
-        let fit = register_film(tree, &film, pairs).filter(FilmFit::holds);
+        let fit = register_film(tree, film, pairs).filter(FilmFit::holds);
         let fit = fit.ok_or_else(|| {
             let what = match self.pairs {
                 Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
@@ -316,18 +321,18 @@ impl CloudArgs {
                      with --pairs"
                 }
             };
-            CommandError::Failed(anyhow!("--film {}: {what}", dir.display()))
+            CommandError::Failed(anyhow!("--film {}: {what}", film.dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
         let sway = sway_on_scan(
             &document.skeleton,
             metres_per_px,
-            &film,
-            &filmed_points(&film)?,
+            film,
+            &filmed_points(film)?,
             &fit.registration,
         );
         let has_tag = film.note.tag.is_some();
-        Ok(Some(FilmOnScan { fit, sway, has_tag }))
+        Ok(FilmOnScan { fit, sway, has_tag })
     }
 }
 
@@ -395,4 +400,5 @@ fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
         figures.percent(figures.ground),
         figures.percent(figures.noise),
     ));
+    eprint_line(&verdict(&figures).labelled_line());
 }

@@ -3,12 +3,14 @@
 //! [`tree_of_cloud`] is the whole way: ground and noise off, points thinned, joined to their
 //! neighbours; several trees parted from each other ([`stems`]); the foot of the trunk; middle
 //! lines by the shortest ways from there ([`levels`]) or by space colonisation ([`colonise`]);
-//! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]).
+//! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]). How well all that
+//! agrees with the points ([`fit`]) makes the [`verdict`].
 
 mod base;
 mod circle;
 mod colonise;
 mod error;
+mod fit;
 mod foot;
 mod graph;
 mod grid;
@@ -26,11 +28,13 @@ mod standing;
 mod stems;
 mod thin;
 mod tree;
+mod verdict;
 
 pub use error::CloudError;
 pub use lines::{LinePlace, Nearest, WoodPiece, places_seen, thickest};
 pub use register::{PlacePair, Registration, by_lines, by_pairs};
 pub use tree::{CloudFigures, CloudNode, CloudTree};
+pub use verdict::verdict;
 
 use crate::model::PointCloud;
 use ground::Ground;
@@ -170,6 +174,7 @@ fn tree_of(
     options: CloudOptions,
     mut figures: CloudFigures,
 ) -> Result<CloudTree, CloudError> {
+    figures.in_leaf = options.in_leaf;
     if options.in_leaf {
         linked = linked.without_leaves(standing, &mut figures)?;
     }
@@ -214,10 +219,12 @@ fn tree_of(
     refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
     paths::prune(&mut paths, least);
     let noise = radius::noise(&paths);
+    figures.foot_share = fit::foot_share(&paths);
     base::stand(&mut paths, base, |at| standing.ground_at(at));
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
     radius::assign(&mut paths, figures.twig_radius_m);
+    figures.on_wood = fit::on_wood(&paths, points, f64::from(cell));
     let nodes = tree::assemble(&paths, f64::from(cell));
     let Some(first) = nodes.first() else {
         return Err(CloudError::NoTree);

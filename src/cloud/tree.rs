@@ -41,7 +41,8 @@ pub struct CloudFigures {
     pub ground: usize,
     pub noise: usize,
     pub apart: usize,
-    /// Points of leaves, where they were taken off.
+    /// Whether leaves were to be taken off, and their points.
+    pub in_leaf: bool,
     pub leaves: usize,
     /// Side of the cells in which points are one, m.
     pub cell_m: f64,
@@ -51,6 +52,11 @@ pub struct CloudFigures {
     pub twig_radius_m: f64,
     /// Height of the tree from its foot, m.
     pub height_m: f64,
+    /// Share of its points that lie on the wood.
+    pub on_wood: f64,
+    /// How thick the foot of the trunk is against the thickest wood; `None` where no circle was found
+    /// on the trunk.
+    pub foot_share: Option<f64>,
 }
 
 impl CloudFigures {

@@ -175,7 +175,8 @@ impl Document {
             .iter()
             .map(|(k, node)| (TrackId::of_marker(seen[*k].marker), *node))
             .collect();
-        let film = points.film_on(&skeleton, |id| node_of_marker.get(&id).copied());
+        let mut film = points.film_on(&skeleton, |id| node_of_marker.get(&id).copied());
+        film.are_markers = true;
         MarkedTree {
             skeleton,
             names,

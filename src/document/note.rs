@@ -139,6 +139,12 @@ pub struct ScanNote {
     pub noise_m: f64,
     /// Radius of the last twigs, m.
     pub twig_radius_m: f64,
+    /// Share of the tree's points that lie on the wood; `null` in those of before.
+    #[serde(default)]
+    pub on_wood: Option<f64>,
+    /// How thick the foot is against the thickest wood; `null` where no round trunk was found there.
+    #[serde(default)]
+    pub foot_share: Option<f64>,
     /// The film that was laid on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<ScanFilmNote>,

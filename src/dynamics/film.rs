@@ -49,6 +49,9 @@ pub struct Film {
     /// Strictly growing, s.
     pub times_s: Vec<f64>,
     pub tracks: Vec<FilmTrack>,
+    /// Whether the points are markers, each bound to its branch by hand: one is enough. Of points that
+    /// were found to move together several must agree.
+    pub are_markers: bool,
 }
 
 impl Film {
@@ -65,7 +68,13 @@ impl Film {
         Self {
             times_s: kept.iter().map(|&k| times_s[k]).collect(),
             tracks: tracks.iter().map(|t| t.in_frames(&kept)).collect(),
+            are_markers: false,
         }
+    }
+
+    /// Points that a branch must have, where `of_followed` are needed to agree.
+    pub(super) fn least_points(&self, of_followed: usize) -> usize {
+        if self.are_markers { 1 } else { of_followed }
     }
 
     /// The points of a part of the log; `node_of` says on which measured node of `skeleton` a point
@@ -150,6 +159,7 @@ impl Film {
         Cow::Owned(Self {
             times_s: self.times_s[frames].to_vec(),
             tracks,
+            are_markers: self.are_markers,
         })
     }
 
@@ -177,6 +187,7 @@ impl Film {
         Cow::Owned(Self {
             times_s: times_s.collect(),
             tracks,
+            are_markers: film.are_markers,
         })
     }
 

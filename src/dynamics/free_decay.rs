@@ -159,7 +159,7 @@ impl FreeDecay<'_> {
     /// The sway of a branch by its points and the modes of its carriers.
     fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let points = Points::of(self.film, branch.tracks);
-        if points.tracks.len() < MIN_POINTS {
+        if points.tracks.len() < self.film.least_points(MIN_POINTS) {
             return Err(Unidentified::NotMeasured);
         }
         let found = self.estimate_from(branch, &points)?;
@@ -254,10 +254,13 @@ impl FreeDecay<'_> {
 
     /// Fits the modes of the ancestors and as many more as the points carry.
     fn fit(&self, node: NodeId, points: &Points) -> FittedModes {
-        let mut ancestors: Vec<BranchMode> = Vec::new();
-        for above in self.tree.carriers(node) {
-            ancestors.extend(self.own[above.index()]);
+        let mut carriers: Vec<NodeId> = self.tree.carriers(node).collect();
+        // All sways with the trunk: what seems to stand beside it on the foot, too.
+        if node != self.trunk && !carriers.contains(&self.trunk) {
+            carriers.push(self.trunk);
         }
+        let known = carriers.iter().filter_map(|above| self.own[above.index()]);
+        let ancestors: Vec<BranchMode> = known.collect();
         let times_s = self.film.times_s.iter();
         let signals = Signals::new(
             times_s.map(|t| t - self.release.at_s).collect(),

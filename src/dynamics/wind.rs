@@ -165,7 +165,9 @@ impl InWind<'_> {
     fn by_own_points(&mut self, branch: &BranchInFilm) -> Swaying {
         let speaking = self.speaking(branch.node, branch.tracks);
         let points = Points::of(self.film, &speaking.tracks);
-        if branch.tracks.len() < MIN_POINTS_IN_ALL || points.tracks.len() < MIN_POINTS {
+        let least = self.film.least_points(MIN_POINTS);
+        let least_in_all = self.film.least_points(MIN_POINTS_IN_ALL);
+        if branch.tracks.len() < least_in_all || points.tracks.len() < least {
             return Err(Unidentified::NotMeasured);
         }
         let of_carrier = self.speaking(branch.parent, &self.beside(branch));
@@ -173,7 +175,7 @@ impl InWind<'_> {
         // What a carrier's own sway is must be known, or be none, and its motion seen, for that of
         // the branch to be told from it.
         let carrier_is_unknown = matches!(self.known[branch.parent.index()], Known::Nothing)
-            || carrier.tracks.len() < MIN_POINTS;
+            || carrier.tracks.len() < least;
         if !branch.is_on_foot() && carrier_is_unknown {
             return Err(Unidentified::AncestorsSway);
         }

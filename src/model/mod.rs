@@ -86,5 +86,5 @@ pub use track_table::TrackTable;
 pub use tree_mode::{LimbEnergy, TreeMode};
 pub use tree_strokes::{TreeStrokes, scaled};
 pub use user_notes::{NoteError, UserNote, UserNotes};
-pub use verdict::{Grade, Judgement, Verdict};
+pub use verdict::{Finding, Grade, Judgement, Verdict};
 pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight};

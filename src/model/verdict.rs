@@ -33,9 +33,12 @@ pub struct Judgement {
 }
 
 /// One thing that is not as it should be.
-pub(super) struct Finding {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Finding {
     pub grade: Grade,
+    /// Half a sentence.
     pub reason: String,
+    /// What to do, likewise.
     /// Empty where it follows from the others.
     pub advice: String,
 }
@@ -59,7 +62,7 @@ impl Grade {
     }
 
     /// The grade of a value of which more is better; `None` is good.
-    pub(super) fn of(value: f64, fair: f64, poor: f64) -> Option<Self> {
+    pub fn of(value: f64, fair: f64, poor: f64) -> Option<Self> {
         if value < poor {
             Some(Self::Poor)
         } else if value < fair {
@@ -73,12 +76,17 @@ impl Grade {
 impl Verdict {
     /// Judges a capture.
     pub fn of(facts: &CaptureFacts) -> Self {
+        Self::of_findings(facts.findings())
+    }
+
+    /// The verdict of these findings, the worst first.
+    pub fn of_findings(findings: impl IntoIterator<Item = Finding>) -> Self {
         let mut verdict = Self::default();
         for Finding {
             grade,
             reason,
             advice,
-        } in facts.findings()
+        } in findings
         {
             verdict.grade = verdict.grade.max(grade);
             verdict.reasons.push(reason);

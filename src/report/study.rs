@@ -81,8 +81,8 @@ pub struct Study {
     pub outline_px: Vec<Point2<i32>>,
     pub picture: Option<String>,
     pub branches: Vec<Branch>,
-    /// The branches are those between coloured markers, which seldom have enough points for a frequency
-    /// with an interval: their peaks are all that there is.
+    /// The branches are those between coloured markers: of those without a frequency the peak of the angle
+    /// is said.
     pub by_markers: bool,
     /// The modes of the whole tree, the slowest first.
     pub modes: Vec<ModeSummary>,

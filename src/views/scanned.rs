@@ -3,7 +3,7 @@
 use super::PrepareError;
 use super::drawn::{DrawnTree, note};
 use super::film_fit::FilmFit;
-use crate::cloud::CloudTree;
+use crate::cloud::{CloudTree, verdict};
 use crate::config::{Config, LeafShow};
 use crate::document::note::{ScanFilmNote, ScanNote};
 use crate::model::{Outline, PointCloud, Swaying};
@@ -90,6 +90,7 @@ impl DrawnTree {
         config.export.metres_per_px = scaled.metres_per_px;
         let mut note = note(name, &scaled.skeleton, region, config);
         note.scan = Some(scan_note(cloud, tree));
+        note.verdict = Some(verdict(&tree.figures));
         Self {
             note,
             skeleton: scaled.skeleton,
@@ -131,6 +132,8 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         cell_m: figures.cell_m,
         noise_m: figures.noise_m,
         twig_radius_m: figures.twig_radius_m,
+        on_wood: Some(figures.on_wood),
+        foot_share: figures.foot_share,
         film: None,
     }
 }

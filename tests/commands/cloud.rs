@@ -2,6 +2,7 @@
 
 use crate::chance::Chance;
 use crate::support::names_in;
+use crate::to_folder::{BAD_USAGE, FAILED, NO_INPUT, arborcam, done};
 use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
 use arborcam::model::{NodeId, NodeKind};
@@ -10,25 +11,6 @@ use std::fmt::Write as _;
 use std::fs;
 use std::io::BufReader;
 use std::path::Path;
-use std::process::{Command, Output};
-
-const FAILED: i32 = 1;
-const BAD_USAGE: i32 = 2;
-const NO_INPUT: i32 = 3;
-
-fn arborcam(arguments: &[&str], out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.args(arguments).arg("--out").arg(out);
-    command.output().expect("arborcam")
-}
-
-/// Runs a command that must succeed, and returns what it said.
-fn done(arguments: &[&str], out: &Path) -> String {
-    let output = arborcam(arguments, out);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments:?}: {said}");
-    said
-}
 
 /// A tapered tube: its ends, and its radii there, m.
 type Tube = ([f64; 3], [f64; 3], f64, f64);
@@ -259,6 +241,33 @@ fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
     );
 }
 
+/// What the cloud of `points` is said to be worth.
+fn verdict(points: &[Point3<f64>]) -> String {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [cloud, out] = ["tree.xyz", "tree"].map(|name| dir.path().join(name));
+    write_xyz(&cloud, points, 1.0);
+    let said = done(&["cloud", cloud.to_str().expect("name")], &out);
+    let line = said.lines().find(|l| l.starts_with("verdict: "));
+    let line = line.expect("a verdict").to_owned();
+    let noted = Document::read(&out, 60.0).expect("a document").note.verdict;
+    assert_eq!(noted.expect("a verdict").labelled_line(), line);
+    let holds_ground = !said.contains("the cloud holds no ground");
+    assert_eq!(holds_ground, points.len() > 40_000, "{said}");
+    line
+}
+
+#[test]
+fn a_tree_on_its_head_is_no_good_tree() {
+    let mut chance = Chance::new(7);
+    assert_eq!(verdict(&tree_on_ground(&mut chance)), "verdict: good");
+    let tree = points_on(&TUBES, 0.012, 0.003, &mut chance);
+    assert_eq!(verdict(&tree), "verdict: good");
+    let turned: Vec<Point3<f64>> = tree.iter().map(|p| Point3::new(p.x, -p.y, -p.z)).collect();
+    let line = verdict(&turned);
+    assert!(line.starts_with("verdict: poor, because: "), "{line}");
+    assert!(line.contains("foot") && line.contains("z is up"), "{line}");
+}
+
 #[test]
 fn units_are_taken_as_given() {
     let dir = tempfile::tempdir().expect("tempdir");
@@ -364,7 +373,7 @@ fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
         let [a, b] = [one.join(file), out.join("tree-0002").join(file)];
         assert_eq!(fs::read(a).expect("file"), fs::read(b).expect("file"));
     }
-    let film = out.to_str().expect("name");
+    let film = one.to_str().expect("name");
     for more in [["--tree", "4"], ["--film", film]] {
         let none = dir.path().join("none");
         let output = arborcam(&["cloud", name, more[0], more[1]], &none);

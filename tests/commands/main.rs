@@ -34,3 +34,4 @@ mod photo;
 mod recording;
 mod render;
 mod sketch;
+mod to_folder;

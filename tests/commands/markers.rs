@@ -17,19 +17,27 @@ const FOOT: [f64; 2] = [160.0, 230.0];
 /// Natural frequencies of the trunk and of the branch on it, Hz.
 const TRUNK_HZ: f64 = 1.0;
 const BRANCH_HZ: f64 = 2.3;
+const DAMPING: f64 = 0.03;
 const RED: [f64; 3] = [205.0, 30.0, 38.0];
 
 /// Where the markers are in frame `k`: on the trunk's top and on a branch that it carries, px.
 fn markers_px(k: usize) -> [[f64; 2]; 2] {
     let time_s = k as f64 / RATE_HZ;
-    let trunk = 0.06 * (TAU * TRUNK_HZ * time_s).cos();
-    let branch = 0.10 * (TAU * BRANCH_HZ * time_s).cos();
+    let trunk = 0.06 * decay(TRUNK_HZ, time_s);
+    let branch = 0.10 * decay(BRANCH_HZ, time_s);
     let top = [FOOT[0] + 120.0 * trunk.sin(), FOOT[1] - 120.0 * trunk.cos()];
     let turn = trunk + branch + 0.6;
     [
         top,
         [top[0] + 70.0 * turn.sin(), top[1] - 70.0 * turn.cos()],
     ]
+}
+
+/// A sway of this natural frequency, released at 0 s.
+fn decay(natural_hz: f64, time_s: f64) -> f64 {
+    let rate = TAU * natural_hz;
+    let phase = rate * (1.0 - DAMPING * DAMPING).sqrt() * time_s;
+    (-DAMPING * rate * time_s).exp() * phase.cos()
 }
 
 /// Two discs of one colour before a grey wall.
@@ -169,12 +177,17 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
     assert_eq!(found[1]["parent_id"], found[0]["node_id"]);
     for (branch, hz) in found.iter().zip([TRUNK_HZ, BRANCH_HZ]) {
         let peak = branch["spectrum_peak_hz"].as_f64().expect("a peak");
-        assert!((peak - hz).abs() < 0.05, "{peak} for {hz}");
+        assert!((peak - hz).abs() < 0.1, "{peak} for {hz}");
+        // One marker is enough: it was bound to its branch by hand.
+        let frequency = &branch["frequency_hz"];
+        let [lo, value, hi] =
+            ["lo", "value", "hi"].map(|k| frequency[k].as_f64().expect("a number"));
+        assert!((value / hz - 1.0).abs() < 0.01, "{value} for {hz}");
+        assert!(
+            lo < value && value < hi && hi - lo < 0.1 * hz,
+            "{frequency}"
+        );
     }
-    let output = scene.run("analyze out --markers");
-    let table = String::from_utf8_lossy(&output.stdout).into_owned();
-    // The first has a frequency with an interval, and the second nothing but its peak.
-    assert_eq!(table.matches("; peak ").count(), 1, "{table}");
     // By a file that says that both stand on the foot.
     let [a, b] = markers_px(0);
     scene.markers(&format!("{}, {}", window("A", a, ""), window("B", b, "")));

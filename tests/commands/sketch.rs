@@ -1,33 +1,16 @@
 //! `arborcam sketch`: a tree of drawn strokes, and what bad drawings get.
 
 use crate::support::names_in;
+use crate::to_folder::{BAD_USAGE, FAILED, NO_INPUT, arborcam, done};
 use arborcam::document::Document;
 use arborcam::model::{NodeId, NodeKind, Skeleton};
 use arborcam::signal::distance_to_segment;
 use nalgebra::Point2;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
-const FAILED: i32 = 1;
-const BAD_USAGE: i32 = 2;
-const NO_INPUT: i32 = 3;
 const TREE: &str = "docs/sketches/tree.svg";
 const CONIFER: &str = "docs/sketches/conifer.svg";
-
-fn arborcam(arguments: &[&str], out: &Path) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.args(arguments).arg("--out").arg(out);
-    command.output().expect("arborcam")
-}
-
-/// Runs a command that must succeed, and returns what it said.
-fn done(arguments: &[&str], out: &Path) -> String {
-    let output = arborcam(arguments, out);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments:?}: {said}");
-    said
-}
 
 fn sketched(drawing: &str, out: &Path) -> Document {
     let said = done(&["sketch", drawing], out);

@@ -399,6 +399,20 @@ mod tests {
         );
     }
 
+    /// A point that was put on its branch by hand speaks for it alone.
+    #[test]
+    fn one_marker_on_a_branch_is_enough() {
+        let (skeleton, mut film) = filmed(&[(1.1, &[6.0])]);
+        assert!(analysed(&skeleton, &film)[2].is_err());
+        film.are_markers = true;
+        let sway = analysed(&skeleton, &film)[2].expect("a sway");
+        assert!(
+            (sway.frequency_hz.value / 1.1 - 1.0).abs() < 0.01,
+            "{sway:?}"
+        );
+        assert!(sway.frequency_hz.holds(1.1), "{sway:?}");
+    }
+
     #[test]
     fn a_film_that_carries_nothing_shows_none() {
         let (skeleton, mut film) = filmed(&[(1.1, &[4.0; 6]), (1.4, &[4.0; 6])]);

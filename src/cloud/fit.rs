@@ -1,0 +1,128 @@
+//! How well the wood that was found agrees with the points, and with how trees are built.
+
+use super::paths::{Measured, Path};
+use crate::signal::median;
+use nalgebra::Point3;
+
+/// A point lies on the wood if it is no farther than this from its surface, m, ...
+const ON_WOOD_M: f64 = 0.01;
+/// ... or than this share of the cell in which points are one, ...
+const ON_WOOD_CELLS: f64 = 0.5;
+/// ... or than the share of its radius by which wood is not round.
+const OUT_OF_ROUND: f64 = 0.25;
+/// The foot is the lowest part of the trunk, this share of the tree's height ...
+const FOOT_SHARE: f64 = 0.15;
+/// ... and in it the lowest circles say how thick it is.
+const FOOT_CIRCLES: usize = 5;
+/// Of all circles of a tree this share is thinner than its thickest wood: single ones about forks are too
+/// large.
+const THICKEST_QUANTILE: f64 = 0.98;
+
+/// The share of the points that lie on the wood. `points` are the thinned ones, `cell` is their distance,
+/// m.
+pub(super) fn on_wood(paths: &[Path], points: &[Point3<f32>], cell: f64) -> f64 {
+    let (mut near, mut all) = (0_usize, 0_usize);
+    for path in paths {
+        for (k, place) in path.places.iter().enumerate() {
+            let along = path.direction(k);
+            let most = ON_WOOD_M
+                .max(ON_WOOD_CELLS * cell)
+                .max(OUT_OF_ROUND * place.radius);
+            for point in &place.points {
+                let from_place = points[*point as usize].cast() - place.at;
+                let from_line = from_place.cross(&along).norm();
+                near += usize::from((from_line - place.radius).abs() <= most);
+            }
+            all += place.points.len();
+        }
+    }
+    near as f64 / all.max(1) as f64
+}
+
+/// How thick the foot of the trunk is against the thickest wood. A tree is thickest there; what
+/// stands on its head or lies, or is no tree, is not. `None` where the foot has no circle.
+pub(super) fn foot_share(paths: &[Path]) -> Option<f64> {
+    let trunk = paths.first()?;
+    let bottom = trunk.places.first()?.at.z;
+    let top = paths
+        .iter()
+        .flat_map(|path| &path.places)
+        .map(|place| place.at.z)
+        .fold(bottom, f64::max);
+    let low = bottom + FOOT_SHARE * (top - bottom);
+    let lowest = circles(trunk).filter(|(z, _)| *z <= low);
+    let lowest = lowest.map(|(_, circle)| circle.radius).take(FOOT_CIRCLES);
+    let foot = median(lowest.collect(), f64::total_cmp)?;
+    let all = paths.iter().flat_map(circles);
+    let mut radii: Vec<f64> = all.map(|(_, circle)| circle.radius).collect();
+    let place = (THICKEST_QUANTILE * (radii.len() - 1) as f64) as usize;
+    let thickest = *radii.select_nth_unstable_by(place, f64::total_cmp).1;
+    Some(foot / thickest)
+}
+
+/// The circles of a path from its base on, and their heights, m.
+fn circles(path: &Path) -> impl Iterator<Item = (f64, Measured)> {
+    let measured = path
+        .places
+        .iter()
+        .filter_map(|p| Some((p.at.z, p.measured?)));
+    measured.filter(|(_, measured)| measured.is_circle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::paths::Place;
+    use super::*;
+
+    /// A path up with these radii, 0.1 m apart, and four points round every place.
+    fn upright(radii: &[f64]) -> (Path, Vec<Point3<f32>>) {
+        let mut path = Path::default();
+        let mut points: Vec<Point3<f32>> = Vec::new();
+        for (k, radius) in (0..).zip(radii) {
+            let at = Point3::new(0.0, 0.0, 0.1 * f64::from(k));
+            let mut place = Place::new(at);
+            place.radius = *radius;
+            place.measured = Some(Measured {
+                radius: *radius,
+                spread: 0.001,
+                points: 4,
+                is_circle: true,
+            });
+            for (x, y) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+                place.points.push(points.len() as u32);
+                let around = Point3::new(radius * x, radius * y, at.z);
+                points.push(around.cast());
+            }
+            path.places.push(place);
+        }
+        (path, points)
+    }
+
+    #[test]
+    fn points_round_the_wood_lie_on_it_and_others_do_not() {
+        let (path, mut points) = upright(&[0.1; 20]);
+        let paths = [path];
+        assert_eq!(on_wood(&paths, &points, 0.01), 1.0);
+        for point in points.iter_mut().step_by(4) {
+            point.x = 0.15;
+        }
+        assert_eq!(on_wood(&paths, &points, 0.01), 0.75);
+        // Points that are one in so coarse a cell are known no better.
+        assert_eq!(on_wood(&paths, &points, 0.12), 1.0);
+    }
+
+    #[test]
+    fn a_tree_is_thickest_at_its_foot() {
+        let radii: Vec<f64> = (0..100).map(|k| 0.2 - 0.001 * f64::from(k)).collect();
+        let (mut path, _) = upright(&radii);
+        let foot = foot_share(std::slice::from_ref(&path)).expect("circles");
+        assert!((0.95..=1.05).contains(&foot), "{foot}");
+        let (turned, _) = upright(&radii.iter().rev().copied().collect::<Vec<f64>>());
+        let foot = foot_share(&[turned]).expect("circles");
+        assert!(foot < 0.6, "{foot}");
+        for place in &mut path.places[..20] {
+            place.measured = None;
+        }
+        assert_eq!(foot_share(&[path]), None);
+    }
+}

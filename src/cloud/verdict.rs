@@ -1,0 +1,91 @@
+//! What the tree of a cloud is worth: good, fair or poor, why, and what to do.
+
+use super::CloudFigures;
+use crate::model::{Finding, Grade, Verdict};
+
+/// Of bare trees 0.90 to 0.99 of the points lie on the wood (scanned from one to four sides). In leaf it is
+/// 0.64 to 0.67, and the length is three times the true one; with the leaves taken off 0.87 to 0.89 (made
+/// clouds 66001 to 66004; nine real trees in leaf 0.26 to 0.57, three of them with the leaves taken off 0.65 to
+/// 0.79).
+const FAIR_ON_WOOD: f64 = 0.9;
+const POOR_ON_WOOD: f64 = 0.7;
+/// The foot of upright trees is 0.95 and more of the thickest wood; that of trees that lie or stand on
+/// their heads 0.84 at most, or it has no circle.
+const POOR_FOOT: f64 = 0.85;
+
+/// Judges the tree of a cloud.
+pub fn verdict(figures: &CloudFigures) -> Verdict {
+    let found = [foot(figures), off_wood(figures)];
+    Verdict::of_findings(found.into_iter().flatten())
+}
+
+fn foot(figures: &CloudFigures) -> Option<Finding> {
+    let reason = match figures.foot_share {
+        Some(share) if share >= POOR_FOOT => return None,
+        Some(share) => format!(
+            "the foot is {share:.2} times as thick as the thickest wood, and trees are thickest at the foot"
+        ),
+        None => "no round trunk was found at the foot".to_owned(),
+    };
+    Some(Finding {
+        grade: Grade::Poor,
+        reason,
+        advice: "see that z is up, and that the cloud holds the trunk".to_owned(),
+    })
+}
+
+fn off_wood(figures: &CloudFigures) -> Option<Finding> {
+    let grade = Grade::of(figures.on_wood, FAIR_ON_WOOD, POOR_ON_WOOD)?;
+    let advice = match figures.in_leaf {
+        true => "scan it without leaves, or more finely",
+        false => "if it is in leaf, give --in-leaf; else scan it more finely",
+    };
+    Some(Finding {
+        grade,
+        reason: format!(
+            "{:.0} % of its points lie off the wood",
+            100.0 * (1.0 - figures.on_wood)
+        ),
+        advice: advice.to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures(foot_share: Option<f64>, on_wood: f64) -> CloudFigures {
+        CloudFigures {
+            foot_share,
+            on_wood,
+            ..CloudFigures::default()
+        }
+    }
+
+    #[test]
+    fn trees_that_agree_with_their_points_are_good() {
+        assert_eq!(verdict(&figures(Some(1.07), 0.97)), Verdict::default());
+    }
+
+    #[test]
+    fn what_has_no_foot_or_no_wood_is_poor() {
+        let line = verdict(&figures(Some(0.65), 0.95)).line();
+        assert!(
+            line.starts_with("poor, because: the foot is 0.65"),
+            "{line}"
+        );
+        let line = verdict(&figures(None, 0.8)).line();
+        assert!(
+            line.contains("no round trunk") && line.contains("20 %"),
+            "{line}"
+        );
+        assert!(line.contains("--in-leaf"), "{line}");
+        let mut leafless = figures(Some(1.0), 0.88);
+        leafless.in_leaf = true;
+        let line = verdict(&leafless).line();
+        assert!(
+            line.starts_with("fair") && !line.contains("--in-leaf"),
+            "{line}"
+        );
+    }
+}
