@@ -16,6 +16,7 @@ use crate::source::{Source, SourceInfo};
 use crate::tui;
 use anyhow::anyhow;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::flag::{register, register_conditional_shutdown};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::sync::Arc;
@@ -196,10 +197,12 @@ pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, CommandError>
     let stop = Arc::new(AtomicBool::new(false));
     for signal in ending_signals(by_hangup) {
         // A second signal ends the program at once, without a capture: otherwise nothing could end
-        // it while a disk hangs.
-        signal_hook::flag::register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
-            .and_then(|_| signal_hook::flag::register(signal, stop.clone()))
-            .map_err(CommandError::failed)?;
+        // it while a disk hangs. A closed terminal hangs up twice, itself and through its shell.
+        if signal != SIGHUP {
+            register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
+                .map_err(CommandError::failed)?;
+        }
+        register(signal, stop.clone()).map_err(CommandError::failed)?;
     }
     Ok(stop)
 }

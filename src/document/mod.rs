@@ -85,7 +85,7 @@ pub struct Document {
     pub outline_at_rest: Option<Outline>,
     /// The bark of the filmed trunk as a tile, see [`Wood::bark`].
     pub bark: Option<Arc<Rgb>>,
-    /// Where the leaves are in the picture of a tree that was photographed, not filmed: they stand as
+    /// Where the leaves are in the picture. On a tree that was photographed, not filmed, they stand as
     /// dense as this says.
     pub leaf_mask: Option<Arc<Luma>>,
     /// What the user should know: parts that are missing. One sentence each.
@@ -236,9 +236,7 @@ impl Document {
     }
 
     fn leaf_mask_in_folder(&mut self) -> Option<Arc<Luma>> {
-        if self.note.masks.is_none() || self.note.timing.is_of_film() {
-            return None;
-        }
+        self.note.masks.as_ref()?;
         match at_rest::leaves(&self.dir, size(&self.note)) {
             Ok(mask) => Some(Arc::new(mask)),
             Err(why) => {

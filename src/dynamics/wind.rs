@@ -44,6 +44,9 @@ const MIN_SECOND_VARIANCE: f64 = 0.02;
 pub(super) const MIN_FRAMES: usize = 48;
 /// Motion that is taken for noise, px.
 pub(super) const NOISE_PX: f64 = 0.15;
+/// 95 % of the places of markers are no farther off in films of bare trees (docs/markers.md), and not by
+/// chance: what swings before a marker pulls at its middle. A smaller sway of a single one is none.
+const MARKER_OFF_PX: f64 = 0.9;
 /// Variance of the trunk's oscillator at least, as a share of the largest in the whole tree's
 /// motion.
 const MIN_VARIANCE_OF_TRUNK: f64 = 0.1;
@@ -335,6 +338,10 @@ impl InWind<'_> {
         let max_relative_ci = self.limits.max_relative_ci;
         if found[k].ln_sd.frequency <= 0.0 || !mode.is_within(MAX_CI_TO_SERVE * max_relative_ci) {
             return Err(Unidentified::TooUncertain);
+        }
+        let squares_px2 = 2.0 * found[k].variance / points.tracks.len() as f64;
+        if self.film.are_markers && squares_px2 < MARKER_OFF_PX * MARKER_OFF_PX {
+            return Err(Unidentified::AncestorsSway);
         }
         let shares = fitted.shares(k, motion.noise_px2_per_hz(&times_s));
         let own = Spectrum::of(&motion.own, &times_s, self.limits.frequencies_hz);

@@ -1,7 +1,7 @@
 //! What is known of a capture when it is judged, and what of it is not as it should be.
 
 use super::verdict::{Finding, Grade};
-use super::{FootBasis, Skeleton, Swaying, Unidentified};
+use super::{FootBasis, NodeId, Skeleton, Swaying, Unidentified};
 use serde::{Deserialize, Serialize};
 
 /// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
@@ -137,22 +137,30 @@ impl SwayFacts {
     /// What was found of the sway, by node index; `None` where some of it was not looked at.
     pub fn of(skeleton: &Skeleton, modes: &[Swaying]) -> Option<Self> {
         let mut facts = Self::default();
+        if let Some(trunk) = trunk(skeleton) {
+            let sway = modes.get(trunk.index())?.as_ref().ok();
+            facts.trunk_hz = sway.map(|sway| sway.frequency_hz.value);
+        }
         for node in skeleton.measured_branches() {
             match modes.get(node.index())? {
                 Err(Unidentified::NotInTime) => return None,
                 Err(Unidentified::NotMeasured) => continue,
                 Err(_) => {}
-                Ok(sway) => {
-                    facts.identified += 1;
-                    if skeleton.nodes[node.index()].level == TRUNK_LEVEL {
-                        facts.trunk_hz = Some(sway.frequency_hz.value);
-                    }
-                }
+                Ok(_) => facts.identified += 1,
             }
             facts.branches += 1;
         }
         Some(facts)
     }
+}
+
+/// Of the branches on the foot the one with most points, as everywhere in the analysis of sway.
+fn trunk(skeleton: &Skeleton) -> Option<NodeId> {
+    let node = |id: &NodeId| &skeleton.nodes[id.index()];
+    let on_foot = skeleton
+        .measured_branches()
+        .filter(|id| node(id).level == TRUNK_LEVEL);
+    on_foot.max_by_key(|id| (node(id).n_tracks, std::cmp::Reverse(*id)))
 }
 
 impl CaptureFacts {
@@ -287,15 +295,17 @@ impl CaptureFacts {
     }
 
     fn is_short(&self) -> Option<Finding> {
-        let (needed_s, missing_s) = (self.needed_s(), self.missing_s());
-        if missing_s <= 0.0 {
+        let needed_s = self.needed_s();
+        if self.missing_s() <= 0.0 {
             return None;
         }
         let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
+        // In whole seconds that add up.
+        let (filmed_s, needed_s) = (self.filmed_s.round(), needed_s.ceil());
         Some(Finding {
             grade,
-            reason: format!("{:.0} of {needed_s:.0} s filmed", self.filmed_s),
-            advice: format!("film {:.0} s more", missing_s.ceil()),
+            reason: format!("{filmed_s:.0} of {needed_s:.0} s filmed"),
+            advice: format!("film {:.0} s more", (needed_s - filmed_s).max(1.0)),
         })
     }
 
@@ -362,5 +372,47 @@ impl CaptureFacts {
             reason: reason.into(),
             advice: advice.into(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bounds::Bounds;
+    use crate::model::{Excitation, Interval, Node, Size, Sway};
+
+    fn sway(hz: f64) -> Swaying {
+        let Bounds { lo, hi } = Bounds::new(0.95 * hz, 1.05 * hz);
+        Ok(Sway {
+            frequency_hz: Interval { value: hz, lo, hi },
+            damping_ratio: None,
+            excitation: Excitation::Wind,
+            amplitude_deg: 1.0,
+        })
+    }
+
+    /// Two branches on the foot, of which the first has most of the points.
+    #[test]
+    fn the_trunk_is_the_one_that_carries_most_points() {
+        let on_foot = |name: u32, points: u32| Node {
+            level: TRUNK_LEVEL,
+            n_tracks: points,
+            ..Node::made_up(name, Some(0), [0.0, 50.0, 0.0])
+        };
+        let tree = Skeleton {
+            nodes: vec![
+                Node::made_up(0, None, [0.0; 3]),
+                on_foot(1, 90),
+                on_foot(2, 8),
+            ],
+            foot_px: [0.0; 2].into(),
+            image_size: Size::new(64, 64),
+        };
+        let none = Err(Unidentified::NotMeasured);
+        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)]).expect("facts");
+        assert_eq!((facts.identified, facts.trunk_hz), (2, Some(0.5)));
+        let silent = Err(Unidentified::TooUncertain);
+        let facts = SwayFacts::of(&tree, &[none, silent, sway(0.8)]).expect("facts");
+        assert_eq!((facts.branches, facts.trunk_hz), (2, None));
     }
 }

@@ -26,4 +26,6 @@ pub struct Seen<'a> {
     pub density: Option<&'a Luma>,
     /// Where a photograph shows leaves, pixel by pixel; a drawn density goes before it.
     pub leaf_mask: Option<&'a Luma>,
+    /// The same of a film, which says whether there are any.
+    pub filmed_leaf_mask: Option<&'a Luma>,
 }

@@ -1,5 +1,6 @@
 //! How thick the branches are: the pipe model.
 
+use super::branches::continuations;
 use super::limb::{Grown, Limb};
 use crate::bounds::Bounds;
 use crate::model::{NodeKind, Skeleton};
@@ -66,8 +67,9 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
     }
 }
 
-/// Thickness of the branches whose wood the picture shows: from node to node as the skeleton says.
-/// Twigs are no thicker than what they grow from.
+/// Thickness of the branches whose wood the picture shows: from node to node as the skeleton says, and to
+/// a twig's at a tip. An unseen branch in which a seen one goes on begins as thick as that ends. Others stay
+/// as thick as they are, and like twigs no thicker than what they grow from.
 pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
     if skeleton.nodes.iter().all(|n| n.kind != NodeKind::Traced) {
         return;
@@ -79,6 +81,8 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
     for (seen, node) in is_seen.iter_mut().zip(&skeleton.nodes) {
         *seen |= node.kind == NodeKind::Traced;
     }
+    let goes_on = continuations(skeleton);
+    let tip_px = TIP_RADIUS_PX * f64::from(skeleton.image_size.width) / 640.0;
     for i in 0..grown.len() {
         let (earlier, rest) = grown.split_at_mut(i);
         let Some(Grown { limb, at }) = rest.first_mut() else {
@@ -89,16 +93,35 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
             Some(node) => {
                 let parent = node.parent.map(|p| &skeleton.nodes[p.index()]);
                 let from = parent.filter(|p| p.parent.is_some()).unwrap_or(node).radius;
-                taper(limb, from, node.radius);
+                let to = match goes_on[limb.node.index()] {
+                    Some(_) => node.radius,
+                    None => node.radius.min(tip_px),
+                };
+                taper(limb, from, to);
             }
             None => {
                 let parent = limb.parent.and_then(|p| earlier.get(p));
                 let most = parent.map_or(f64::INFINITY, |p| p.limb.radius_at(*at));
+                let of_branch = parent.filter(|_| !limb.twig);
+                let heir = of_branch.and_then(|p| goes_on[p.limb.node.index()]);
+                if heir == Some(limb.node) {
+                    begin_as_thick(limb, most);
+                }
                 for sample in &mut limb.samples {
                     sample.radius = sample.radius.min(most);
                 }
             }
         }
+    }
+}
+
+/// At its base as thick as `from`, px, and evenly less thickened towards its end.
+fn begin_as_thick(limb: &mut Limb, from: f64) {
+    let last = limb.samples.len().saturating_sub(1).max(1) as f64;
+    let end = limb.samples.last().map_or(0.0, |sample| sample.radius);
+    for (k, sample) in limb.samples.iter_mut().enumerate() {
+        let even = from + (end - from) * k as f64 / last;
+        sample.radius = sample.radius.max(even);
     }
 }
 
@@ -257,5 +280,59 @@ impl Leaving {
         let half = 0.5 * JOINS_WITHIN;
         let share = (self.at.clamp(half, 1.0 - half) - t) / JOINS_WITHIN + 0.5;
         self.pipes * share.clamp(0.0, 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config;
+    use crate::model::{Node, Size};
+    use crate::shape::limbs;
+
+    /// A trunk of 8 px, a limb of 6 px in which it goes on, what goes on unseen in that, and a traced
+    /// branch of 5 px that ends.
+    fn traced() -> Skeleton {
+        let node = |name: u32, parent: u32, at: [f64; 3], radius: f64, kind: NodeKind| Node {
+            radius,
+            kind,
+            level: name as u8,
+            ..Node::made_up(name, Some(parent), at)
+        };
+        Skeleton {
+            nodes: vec![
+                Node::made_up(0, None, [0.0; 3]),
+                node(1, 0, [0.0, 100.0, 0.0], 8.0, NodeKind::Traced),
+                node(2, 1, [0.0, 150.0, 0.0], 6.0, NodeKind::Traced),
+                node(3, 2, [10.0, 250.0, 0.0], 1.0, NodeKind::Measured),
+                node(4, 1, [60.0, 140.0, 0.0], 5.0, NodeKind::Traced),
+            ],
+            foot_px: [320.0, 350.0].into(),
+            image_size: Size::new(640, 360),
+        }
+    }
+
+    #[test]
+    fn wood_tapers_to_its_tips_and_into_what_is_not_seen() {
+        let bare = config::Wood {
+            max_twigs: 0,
+            ..config::Wood::default()
+        };
+        let all = limbs(&traced(), &|_, _| true, &bare, 1);
+        let radii = |node: usize| -> Vec<f64> {
+            let limb = all.iter().find(|limb| limb.node.index() == node);
+            let samples = &limb.expect("a limb").samples;
+            samples.iter().map(|sample| sample.radius).collect()
+        };
+        let unseen = radii(3);
+        assert!((unseen[0] - 6.0).abs() < 1e-9, "{unseen:?}");
+        let steps = unseen.windows(2).map(|r| r[0] - r[1]);
+        assert!(
+            steps.into_iter().all(|step| (0.0..1.5).contains(&step)),
+            "{unseen:?}"
+        );
+        let ends = radii(4);
+        assert!(ends[ends.len() - 1] <= TIP_RADIUS_PX, "{ends:?}");
+        assert!(ends[0] > 5.0, "{ends:?}");
     }
 }

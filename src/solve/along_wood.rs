@@ -28,8 +28,9 @@ pub(super) struct PointOn {
 const SAME_PX: f64 = 8.0;
 
 /// `skeleton`, whose branches are straight, along the `wood`. Its measured nodes keep their order
-/// among themselves.
+/// among themselves. `plain` is the same without the branches that motion shows besides.
 pub(super) fn along_wood(
+    plain: &Skeleton,
     skeleton: &Skeleton,
     wood: &BranchGraph,
     points: &[PointOn],
@@ -46,7 +47,7 @@ pub(super) fn along_wood(
     build.measured();
     build.side_wood();
     build.set_levels();
-    build.tree.copy_into_planes(skeleton, names);
+    build.tree.copy_into_planes(plain, skeleton, names);
     build.settle_unseen();
     build.name(names);
     Joined {

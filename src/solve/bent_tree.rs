@@ -53,12 +53,17 @@ impl BentTree {
         place
     }
 
-    /// Adds the copies that `straight` has of its branches, each along the wood of its original
-    /// turned into its plane.
-    pub fn copy_into_planes(&mut self, straight: &Skeleton, names: &mut Names) {
+    /// Adds the copies that `plain` has of its branches, each along the wood of its original turned into
+    /// its plane. `straight` is the same tree with the branches that motion shows besides: they are
+    /// copied with the branch that bears them, which ends where they leave it.
+    pub fn copy_into_planes(&mut self, plain: &Skeleton, straight: &Skeleton, names: &mut Names) {
         let measured = self.nodes.len();
-        for plane_angle in plane_angles(straight) {
-            let ways = copy_ways(straight, plane_angle);
+        for plane_angle in plane_angles(plain) {
+            let mut ways = copy_ways(plain, plane_angle);
+            for sub_branch in &straight.nodes[plain.measured()..straight.measured()] {
+                let bearer = sub_branch.parent.and_then(|on| ways[on.index()]);
+                ways.push(bearer.map(CopyWay::of_sub_branch));
+            }
             self.copy_into_plane(plane_angle, measured, &ways, names);
         }
     }
@@ -81,9 +86,9 @@ impl BentTree {
             let Some(parent) = node.parent else { continue };
             let way = node.position - self.nodes[parent.index()].position;
             let on = copy_of[parent.index()].unwrap_or(parent);
-            let is_mover = node.moves_with.is_none();
+            let own_name = copied.name.filter(|_| node.moves_with.is_none());
             let copy = Node {
-                name: if is_mover { copied.name } else { names.take() },
+                name: own_name.unwrap_or_else(|| names.take()),
                 parent: Some(on),
                 position: self.nodes[on.index()].position
                     + copied.into_plane * way
@@ -129,7 +134,8 @@ fn copy_ways(straight: &Skeleton, plane_angle: f64) -> Vec<Option<CopyWay>> {
 /// How a copy stands to its original.
 #[derive(Clone, Copy, Debug)]
 struct CopyWay {
-    name: NodeName,
+    /// `None` for a sub-branch.
+    name: Option<NodeName>,
     into_plane: UnitQuaternion<f64>,
     /// By how much its end was pushed out of the plane.
     pushed: Vector3<f64>,
@@ -141,9 +147,18 @@ impl CopyWay {
         let into_plane = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), node.plane_angle);
         let turned = into_plane * way_of(skeleton, original.index());
         Self {
-            name: node.name,
+            name: Some(node.name),
             into_plane,
             pushed: way_of(skeleton, copy) - turned,
+        }
+    }
+
+    /// Of a sub-branch on what is copied like this.
+    fn of_sub_branch(self) -> Self {
+        Self {
+            name: None,
+            pushed: Vector3::zeros(),
+            ..self
         }
     }
 }

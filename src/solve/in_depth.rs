@@ -12,7 +12,7 @@ pub fn in_depth_of(straight: &Skeleton, along: &Skeleton, first_name: u32) -> Sk
         next: first_name,
         prior: None,
     };
-    tree.copy_into_planes(straight, &mut names);
+    tree.copy_into_planes(straight, straight, &mut names);
     Skeleton {
         nodes: tree.nodes,
         ..along.clone()

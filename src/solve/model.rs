@@ -219,7 +219,7 @@ impl Model {
             next: self.names,
             prior: Some(before),
         };
-        let mut joined = along_wood(&straight, branches, &points, &mut names);
+        let mut joined = along_wood(&self.plain, &straight, branches, &points, &mut names);
         self.names = names.next;
         self.set_depths_seen(&mut joined.skeleton);
         assign_radii(&mut joined.skeleton, &self.outline_at_rest, config);

@@ -125,6 +125,8 @@ impl PreparedTree {
         if let Some(drawn) = &cut_to {
             posed.cut(&document, drawn, &config)?;
         }
+        let is_film = document.note.timing.is_of_film();
+        let leaf_mask = document.leaf_mask.as_deref();
         let seen = Seen {
             picture: document.picture.as_ref().map(|p| &*p.rgb),
             pose: posed.pose_in_picture.as_ref(),
@@ -135,7 +137,8 @@ impl PreparedTree {
             leaf_rgb: document.note.leaf_rgb(),
             leaf: leaf.as_ref(),
             density: density.as_ref(),
-            leaf_mask: document.leaf_mask.as_deref(),
+            leaf_mask: leaf_mask.filter(|_| !is_film),
+            filmed_leaf_mask: leaf_mask.filter(|_| is_film),
         };
         let dressed = dress(&posed.skeleton, seen, &config);
         let flutter = flutter(&dressed, &posed.poses, &posed.skeleton, &config);

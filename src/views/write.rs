@@ -77,9 +77,8 @@ impl DocumentWriter {
         );
         // A PNG gives back what was put in.
         document.bark = draft.bark.cloned();
-        let is_photo = !document.note.timing.is_of_film();
-        let at_rest = draft.at_rest.filter(|_| is_photo);
-        document.leaf_mask = at_rest.map(|at_rest| Arc::new(at_rest.masks.leaves.clone()));
+        let masks = draft.at_rest.map(|at_rest| &at_rest.masks);
+        document.leaf_mask = masks.map(|masks| Arc::new(masks.leaves.clone()));
         let options = TreeOptions {
             config,
             ..TreeOptions::default()

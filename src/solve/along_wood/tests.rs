@@ -72,7 +72,13 @@ fn names(prior: Option<&Skeleton>) -> Names<'_> {
 
 #[test]
 fn branches_run_along_their_wood_and_fork_where_it_does() {
-    let joined = along_wood(&straight(), &wood(), &points(), &mut names(None));
+    let joined = along_wood(
+        &straight(),
+        &straight(),
+        &wood(),
+        &points(),
+        &mut names(None),
+    );
     let tree = &joined.skeleton;
     let places: Vec<NodeId> = tree.measured_branches().collect();
     let ends: Vec<Point3<f64>> = places
@@ -110,7 +116,14 @@ fn branches_run_along_their_wood_and_fork_where_it_does() {
 /// A bend that kept its original's place would be filmed twice.
 #[test]
 fn copies_have_the_bends_of_their_originals() {
-    let tree = along_wood(&straight(), &wood(), &points(), &mut names(None)).skeleton;
+    let tree = along_wood(
+        &straight(),
+        &straight(),
+        &wood(),
+        &points(),
+        &mut names(None),
+    )
+    .skeleton;
     let copies: Vec<&Node> = tree.nodes.iter().filter(|n| n.copy_of.is_some()).collect();
     assert_eq!(copies.len(), 4, "{copies:?}");
     for copy in copies {
@@ -127,10 +140,17 @@ fn copies_have_the_bends_of_their_originals() {
 
 #[test]
 fn bends_that_stay_in_place_keep_their_names() {
-    let before = along_wood(&straight(), &wood(), &points(), &mut names(None)).skeleton;
+    let before = along_wood(
+        &straight(),
+        &straight(),
+        &wood(),
+        &points(),
+        &mut names(None),
+    )
+    .skeleton;
     let mut later = names(Some(&before));
     later.next = 100;
-    let after = along_wood(&straight(), &wood(), &points(), &mut later).skeleton;
+    let after = along_wood(&straight(), &straight(), &wood(), &points(), &mut later).skeleton;
     for (before, after) in before.nodes.iter().zip(&after.nodes) {
         assert!(
             before.copy_of.is_some() || before.name == after.name,
@@ -144,7 +164,7 @@ fn bends_that_stay_in_place_keep_their_names() {
 fn a_branch_without_wood_leaves_what_carries_it_without_folding_back() {
     let mut wood = wood();
     wood.nodes.pop();
-    let tree = along_wood(&straight(), &wood, &points(), &mut names(None)).skeleton;
+    let tree = along_wood(&straight(), &straight(), &wood, &points(), &mut names(None)).skeleton;
     let left = tree
         .nodes
         .iter()
@@ -163,7 +183,7 @@ fn a_branch_without_wood_leaves_what_carries_it_without_folding_back() {
 fn a_trunk_that_is_seen_in_part_goes_on_to_its_fork() {
     let mut wood = wood();
     wood.nodes.truncate(2);
-    let tree = along_wood(&straight(), &wood, &points(), &mut names(None)).skeleton;
+    let tree = along_wood(&straight(), &straight(), &wood, &points(), &mut names(None)).skeleton;
     let places = tree.foot_and_branches();
     let trunk = &tree.nodes[places[1].index()];
     // Its own points hold it.
@@ -189,7 +209,7 @@ fn an_unseen_fork_without_points_stands_lower_where_its_limbs_part_wide() {
     wood.nodes.truncate(2);
     let mut points = points();
     points.retain(|p| p.node != NodeId(1));
-    let tree = along_wood(&straight(), &wood, &points, &mut names(None)).skeleton;
+    let tree = along_wood(&straight(), &straight(), &wood, &points, &mut names(None)).skeleton;
     let places = tree.foot_and_branches();
     let trunk = &tree.nodes[places[1].index()];
     assert!((61.0..97.0).contains(&trunk.position.y), "{trunk:?}");
@@ -219,7 +239,7 @@ fn a_branch_that_would_turn_back_leaves_a_straight_one_before_its_end() {
     }
     let mut wood = wood();
     wood.nodes.pop();
-    let tree = along_wood(&straight, &wood, &points, &mut names(None)).skeleton;
+    let tree = along_wood(&straight, &straight, &wood, &points, &mut names(None)).skeleton;
     let places = tree.foot_and_branches();
     let [left, hanging] = [3, 4].map(|branch: usize| &tree.nodes[places[branch].index()]);
     assert_eq!(hanging.parent, left.parent);
@@ -236,9 +256,40 @@ fn a_branch_that_would_turn_back_leaves_a_straight_one_before_its_end() {
 fn a_trunk_alone_and_wood_without_points_are_no_fault() {
     let mut alone = straight();
     alone.nodes.truncate(2);
-    let tree = along_wood(&alone, &wood(), &[], &mut names(None)).skeleton;
+    let tree = along_wood(&alone, &alone, &wood(), &[], &mut names(None)).skeleton;
     assert_eq!(tree.measured_branches().count(), 1);
     let none = BranchGraph::default();
-    let tree = along_wood(&straight(), &none, &points(), &mut names(None)).skeleton;
+    let tree = along_wood(&straight(), &straight(), &none, &points(), &mut names(None)).skeleton;
     assert_eq!(tree.measured_branches().count(), 3);
+}
+
+/// The left limb as motion shows it to fork halfway: it ends there from now on, and one branch goes on to
+/// where it ended.
+fn forked() -> Skeleton {
+    let mut tree = straight();
+    let tip = tree.nodes[3].position;
+    tree.nodes[3].position = Point3::new(-40.0, 130.0, -10.0);
+    let goes_on = Node {
+        kind: NodeKind::Shoot,
+        ..node(7, Some(3), tip.into(), None)
+    };
+    tree.nodes.insert(4, goes_on);
+    tree
+}
+
+/// A copy that was as long as its limb before beside a limb that ends at its fork reached beyond the
+/// tree.
+#[test]
+fn copies_of_a_limb_that_forks_reach_as_high_as_it_does() {
+    let plain = straight();
+    let joined = along_wood(&plain, &forked(), &wood(), &points(), &mut names(None));
+    let nodes = &joined.skeleton.nodes;
+    let measured = joined.skeleton.measured();
+    let mut copies = 0;
+    for copy in &nodes[measured..] {
+        let original = copy.copy_of.expect("a copy").index();
+        assert!((copy.position.y - nodes[original].position.y).abs() < 1e-9);
+        copies += usize::from(nodes[original].kind == NodeKind::Shoot);
+    }
+    assert!(copies > 0, "{nodes:?}");
 }
