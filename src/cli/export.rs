@@ -218,7 +218,7 @@ fn write_qsm(
     for (order, sum) in qsm.by_order().iter().enumerate() {
         let (branches, length, volume) = (sum.branches, sum.length, sum.volume);
         eprint_line(&format!(
-            "order {order}: {branches} branches, {length:.2} {unit}, {volume:.5} {unit}3"
+            "order {order}: {branches} branches, length {length:.2} {unit}, volume {volume:.5} {unit}3"
         ));
     }
     Ok(())

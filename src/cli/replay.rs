@@ -4,9 +4,13 @@ use super::command_error::CommandError;
 use super::common::{Common, check_fps};
 use super::recording::RecordOption;
 use super::session::{self, Plan};
+use super::unused;
 use crate::runtime::Pace;
 use clap::Args;
 use std::path::PathBuf;
+
+/// Rate of a folder of pictures that nothing is said of, Hz.
+const PICTURES_FPS: f64 = 30.0;
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
@@ -17,9 +21,9 @@ pub struct ReplayArgs {
     /// recording's own pace is kept.
     #[arg(long)]
     fast: bool,
-    /// Rate of a folder of pictures, frames per second.
-    #[arg(long, value_name = "RATE", default_value_t = 30.0)]
-    fps: f64,
+    /// Rate of a folder of pictures, frames per second; 30 if not given.
+    #[arg(long, value_name = "RATE")]
+    fps: Option<f64>,
     #[command(flatten)]
     common: Common,
     #[command(flatten)]
@@ -27,7 +31,11 @@ pub struct ReplayArgs {
 }
 
 pub fn run(args: &ReplayArgs) -> Result<(), CommandError> {
-    check_fps(args.fps)?;
+    let fps = args.fps.unwrap_or(PICTURES_FPS);
+    check_fps(fps)?;
+    if args.fps.is_some() && !args.input.is_dir() {
+        unused::note("--fps", "a film has its own times");
+    }
     let pace = if args.fast {
         Pace::Fast
     } else {
@@ -37,7 +45,7 @@ pub fn run(args: &ReplayArgs) -> Result<(), CommandError> {
         &args.common,
         Plan {
             input: &args.input,
-            fps: Some(args.fps),
+            fps: Some(fps),
             pace: Some(pace),
             camera: None,
             record: &args.record,

@@ -253,6 +253,11 @@ impl<'a> TrackThread<'a> {
         if n < DAMAGE_REPORTED {
             self.shared
                 .warn(format!("frame {} is left out: {e}", timed.index));
+        } else if n == DAMAGE_REPORTED {
+            self.shared.warn(
+                "more frames cannot be decoded; capture.json counts them (frames_undecodable)"
+                    .into(),
+            );
         }
         self.last_damage = Some(e);
     }

@@ -186,7 +186,7 @@ fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
             &["export", out.to_str().expect("name"), "--format", format],
             &path,
         );
-        assert!(said.contains("order 0: 1 branches, 5."), "{said}");
+        assert!(said.contains("order 0: 1 branches, length 5."), "{said}");
         let bytes = fs::read(&path).expect("file");
         trees.push(read_model(&bytes, &path).expect("a tree").tree);
     }
