@@ -11,6 +11,8 @@ One row a film:
   other     share of the places that are more than a marker's width from the true one: they are on another thing
   board     px between the true place and the hidden marker's in the two seconds after the board, median
   first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
+and at the end for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
+held against that true branch between the marker and its parent whose frequency is nearest. One with no true branch between is wrong.
 """
 import argparse, csv, json, subprocess, tempfile
 from collections import defaultdict
@@ -18,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+RIGHT_WITHIN = 0.02
 FIRST_ID = 1_000_000_000
 END_S = 2.0
 
@@ -42,6 +45,9 @@ def main():
         told = np.isfinite(off)
         print(f"first frequency by {name}: {told.sum()} of {len(off)}, largest error {np.abs(off[told]).max(initial=0):.4f} Hz, "
               f"within 0.01 Hz {np.sum(np.abs(off[told]) <= 0.01)}")
+    told = np.concatenate([r["answers"] for r in rows])
+    print(f"branches with an answer: {len(told)} of {sum(r['markers'] for r in rows)}, within {RIGHT_WITHIN:.0%} {told[:, 0].sum():.0f}, "
+          f"in its interval {told[:, 1].sum():.0f}, damping in its {np.nansum(told[:, 2]):.0f} of {np.isfinite(told[:, 2]).sum()}")
 
 
 def row(args, film, out):
@@ -70,11 +76,13 @@ def row(args, film, out):
     errors = np.concatenate(errors)
     other = errors > 2 * truth["radius_px"]
     trunk = truth["markers"][0]
-    analysis, peak = frequencies(args.arborcam, film, out, trunk["name"])
+    branches = study_of(args.arborcam, film, out)
+    analysis, peak = frequencies(branches, trunk["name"])
     true_hz = trunk["freq_hz"] * np.sqrt(1 - trunk["damping"] ** 2)
     print(f"{film.name:<12}{len(matched):>5}/{len(truth['markers']):<3}{np.median(errors):>8.2f}{np.quantile(errors, 0.95):>7.2f}"
           f"{errors.max():>7.1f}{100 * other.mean():>7.1f}%{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
-    return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz=true_hz)
+    return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz=true_hz,
+                answers=answers(film, branches))
 
 
 def places(capture):
@@ -101,8 +109,8 @@ def match(markers, seen):
     return matched
 
 
-def frequencies(arborcam, film, capture, name):
-    """Of one marker's branch, Hz: by the analysis, and the peak of its angle's spectrum; no numbers where unknown."""
+def study_of(arborcam, film, capture):
+    """The branches by markers as `analyze --json` has them; none where it fails."""
     by = [] if not (film / "markers.json").exists() else [f"--markers={film / 'markers.json'}"]
     notes = json.loads((capture / "capture.json").read_text())["config"]["markers"]
     if notes["find"]:
@@ -110,12 +118,45 @@ def frequencies(arborcam, film, capture, name):
     done = subprocess.run([arborcam, "analyze", capture, *by, "--json"], capture_output=True, text=True)
     if done.returncode:
         print(done.stderr)
+        return []
+    return json.loads(done.stdout)["captures"][0]["branches"]
+
+
+def frequencies(branches, name):
+    """Of one marker's branch, Hz: by the analysis, and the peak of its angle's spectrum; no numbers where unknown."""
+    if not branches:
         return np.nan, np.nan
-    study = json.loads(done.stdout)
-    branches = study["captures"][0]["branches"]
     own = next((b for b in branches if b["branch"] == name), branches[0])
     number = lambda x: np.nan if x is None else float(x)
     return number((own["frequency_hz"] or {}).get("value")), number(own["spectrum_peak_hz"])
+
+
+def answers(film, branches):
+    """A row for each answer: right, within its interval, damping within its interval (NaN without); held against that true branch
+    between the marker and its parent whose frequency is nearest."""
+    true = json.loads((film / "truth.json").read_text())["branches"]
+    markers = {m["name"]: m for m in json.loads((film / "truth_markers.json").read_text())["markers"]}
+    rows = []
+    for branch in branches:
+        frequency, damping, marker = branch["frequency_hz"], branch["damping_ratio"], markers.get(branch["branch"])
+        if frequency is None or marker is None:
+            continue
+        ends_on = markers[marker["parent"]]["branch"] if marker["parent"] else -1
+        at, between = marker["branch"], []
+        while at not in (-1, ends_on):
+            between.append(true[at])
+            at = true[at]["parent"]
+        if not between:
+            rows.append((False, False, False))
+            continue
+        nearest = min(between, key=lambda b: abs(np.log(frequency["value"] / b["freq_hz"])))
+        holds = lambda interval, value: interval["lo"] <= value <= interval["hi"]
+        rows.append((
+            abs(frequency["value"] / nearest["freq_hz"] - 1) <= RIGHT_WITHIN,
+            holds(frequency, nearest["freq_hz"]),
+            np.nan if damping is None else holds(damping, nearest["damping"]),
+        ))
+    return np.array(rows, float).reshape(-1, 3)
 
 
 if __name__ == "__main__":
