@@ -173,7 +173,8 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     if stop.while_writing().load(Ordering::SeqCst) {
         return Err(CommandError::Stopped);
     }
-    let branches = drawn.skeleton.measured_branches().count();
+    let branches = drawn.skeleton.botanical_branches().all.len();
+    let pieces = drawn.skeleton.measured_branches().count();
     match &film {
         Some(capture) => {
             let film = args.laid_on(capture, &tree, &scan, &drawn)?;
@@ -184,7 +185,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
             }
             drawn.write_with_film(&args.out, &film)?;
             eprint_line(&format!(
-                "{}; {swaying} of {branches} branches carry its frequencies",
+                "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
                 lies_on(&film.fit)
             ));
         }

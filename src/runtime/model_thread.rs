@@ -4,7 +4,7 @@
 use super::announce::Announced;
 use super::background::{Background, Beside, Pending};
 use super::capture_tables::CaptureTables;
-use super::depth_scale::take_scale_of_depth;
+use super::depth_scale::{doubt_of_depth, take_scale_of_depth};
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::job::{Job, Summary};
 use super::judge::judge;
@@ -267,6 +267,10 @@ impl ModelThread {
         self.refining.give_up();
         self.back.finish(&self.shared.pulse.optional_work);
         self.take_scale_of_depth();
+        let model = self.back.model().map(|model| &**model);
+        if let Some(doubt) = doubt_of_depth(&self.job.config, model) {
+            self.shared.warn(doubt);
+        }
         if self.back.has_unused_strokes() {
             self.shared.warn(STROKES_TOO_LATE.into());
         }

@@ -5,7 +5,7 @@
 //! or by a full disk is completed from there.
 
 use super::announce::Announced;
-use super::depth_scale::take_scale_of_depth;
+use super::depth_scale::{doubt_of_depth, take_scale_of_depth};
 use super::finish::{self, CaptureJob, Quality, Written};
 use super::shared::{Failure, Shared};
 use super::status::{median_error_px, median_fb_error_px};
@@ -272,7 +272,11 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     Announced::default().tell_of_wood(back.wood_sight(), true, &shared);
     let _ = std::fs::remove_file(dir.join(RESERVE_FILE));
     let mut config = note.config;
-    take_scale_of_depth(&mut config, back.model().map(|model| &**model));
+    let model = back.model().map(|model| &**model);
+    take_scale_of_depth(&mut config, model);
+    if let Some(doubt) = doubt_of_depth(&config, model) {
+        shared.warn(doubt);
+    }
     let job = CaptureJob {
         tree: back.model().cloned(),
         outline: back.outline().cloned(),

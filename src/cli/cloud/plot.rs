@@ -39,7 +39,7 @@ pub(super) fn write(
             }
         };
         let drawn = scan.drawn(tree).map_err(CommandError::Failed)?;
-        let branches = drawn.skeleton.measured_branches().count();
+        let branches = drawn.skeleton.botanical_branches().all.len();
         standing.push(StandingTree::of(name.clone(), tree, &drawn));
         let dir = args.out.join(name);
         drawn.write(&dir)?;

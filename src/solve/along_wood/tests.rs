@@ -66,19 +66,19 @@ fn points() -> Vec<PointOn> {
     points
 }
 
+/// The tree of [`straight`] along some wood.
+fn straight_along(wood: &BranchGraph, points: &[PointOn], names: &mut Names) -> Joined {
+    let straight = straight();
+    along_wood(&straight, &straight, wood, points, names)
+}
+
 fn names(prior: Option<&Skeleton>) -> Names<'_> {
     Names { next: 6, prior }
 }
 
 #[test]
 fn branches_run_along_their_wood_and_fork_where_it_does() {
-    let joined = along_wood(
-        &straight(),
-        &straight(),
-        &wood(),
-        &points(),
-        &mut names(None),
-    );
+    let joined = straight_along(&wood(), &points(), &mut names(None));
     let tree = &joined.skeleton;
     let places: Vec<NodeId> = tree.measured_branches().collect();
     let ends: Vec<Point3<f64>> = places
@@ -116,14 +116,7 @@ fn branches_run_along_their_wood_and_fork_where_it_does() {
 /// A bend that kept its original's place would be filmed twice.
 #[test]
 fn copies_have_the_bends_of_their_originals() {
-    let tree = along_wood(
-        &straight(),
-        &straight(),
-        &wood(),
-        &points(),
-        &mut names(None),
-    )
-    .skeleton;
+    let tree = straight_along(&wood(), &points(), &mut names(None)).skeleton;
     let copies: Vec<&Node> = tree.nodes.iter().filter(|n| n.copy_of.is_some()).collect();
     assert_eq!(copies.len(), 4, "{copies:?}");
     for copy in copies {
@@ -140,17 +133,10 @@ fn copies_have_the_bends_of_their_originals() {
 
 #[test]
 fn bends_that_stay_in_place_keep_their_names() {
-    let before = along_wood(
-        &straight(),
-        &straight(),
-        &wood(),
-        &points(),
-        &mut names(None),
-    )
-    .skeleton;
+    let before = straight_along(&wood(), &points(), &mut names(None)).skeleton;
     let mut later = names(Some(&before));
     later.next = 100;
-    let after = along_wood(&straight(), &straight(), &wood(), &points(), &mut later).skeleton;
+    let after = straight_along(&wood(), &points(), &mut later).skeleton;
     for (before, after) in before.nodes.iter().zip(&after.nodes) {
         assert!(
             before.copy_of.is_some() || before.name == after.name,
@@ -164,7 +150,7 @@ fn bends_that_stay_in_place_keep_their_names() {
 fn a_branch_without_wood_leaves_what_carries_it_without_folding_back() {
     let mut wood = wood();
     wood.nodes.pop();
-    let tree = along_wood(&straight(), &straight(), &wood, &points(), &mut names(None)).skeleton;
+    let tree = straight_along(&wood, &points(), &mut names(None)).skeleton;
     let left = tree
         .nodes
         .iter()
@@ -183,7 +169,7 @@ fn a_branch_without_wood_leaves_what_carries_it_without_folding_back() {
 fn a_trunk_that_is_seen_in_part_goes_on_to_its_fork() {
     let mut wood = wood();
     wood.nodes.truncate(2);
-    let tree = along_wood(&straight(), &straight(), &wood, &points(), &mut names(None)).skeleton;
+    let tree = straight_along(&wood, &points(), &mut names(None)).skeleton;
     let places = tree.foot_and_branches();
     let trunk = &tree.nodes[places[1].index()];
     // Its own points hold it.
@@ -209,7 +195,7 @@ fn an_unseen_fork_without_points_stands_lower_where_its_limbs_part_wide() {
     wood.nodes.truncate(2);
     let mut points = points();
     points.retain(|p| p.node != NodeId(1));
-    let tree = along_wood(&straight(), &straight(), &wood, &points, &mut names(None)).skeleton;
+    let tree = straight_along(&wood, &points, &mut names(None)).skeleton;
     let places = tree.foot_and_branches();
     let trunk = &tree.nodes[places[1].index()];
     assert!((61.0..97.0).contains(&trunk.position.y), "{trunk:?}");
@@ -259,7 +245,7 @@ fn a_trunk_alone_and_wood_without_points_are_no_fault() {
     let tree = along_wood(&alone, &alone, &wood(), &[], &mut names(None)).skeleton;
     assert_eq!(tree.measured_branches().count(), 1);
     let none = BranchGraph::default();
-    let tree = along_wood(&straight(), &straight(), &none, &points(), &mut names(None)).skeleton;
+    let tree = straight_along(&none, &points(), &mut names(None)).skeleton;
     assert_eq!(tree.measured_branches().count(), 3);
 }
 
