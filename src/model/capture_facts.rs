@@ -156,11 +156,15 @@ impl SwayFacts {
 
 /// Of the branches on the foot the one with most points, as everywhere in the analysis of sway.
 fn trunk(skeleton: &Skeleton) -> Option<NodeId> {
-    let node = |id: &NodeId| &skeleton.nodes[id.index()];
-    let on_foot = skeleton
-        .measured_branches()
-        .filter(|id| node(id).level == TRUNK_LEVEL);
-    on_foot.max_by_key(|id| (node(id).n_tracks, std::cmp::Reverse(*id)))
+    let mut trunk: Option<NodeId> = None;
+    for id in skeleton.measured_branches() {
+        let node = &skeleton.nodes[id.index()];
+        let has_more = trunk.is_none_or(|t| node.n_tracks > skeleton.nodes[t.index()].n_tracks);
+        if node.level == TRUNK_LEVEL && has_more {
+            trunk = Some(id);
+        }
+    }
+    trunk
 }
 
 impl CaptureFacts {
