@@ -239,6 +239,8 @@ impl Document {
         self.note.masks.as_ref()?;
         match at_rest::leaves(&self.dir, size(&self.note)) {
             Ok(mask) => Some(Arc::new(mask)),
+            // Of a film the colours of its picture serve as well.
+            Err(_) if self.note.timing.is_of_film() => None,
             Err(why) => {
                 self.warnings
                     .push(format!("the mask of the leaves is left out: {why}"));

@@ -459,7 +459,7 @@ fn a_film_without_a_tree_is_no_damage() {
     assert!(matches!(error, DocumentError::NoTree { .. }), "{error}");
 }
 
-/// Nothing is made of masks and picture of rest of a capture: what is wrong with them disturbs nobody.
+/// Of masks and picture of rest of a film little is made: what is wrong with them disturbs nobody.
 #[test]
 fn damaged_masks_disturb_nothing() {
     let dir = copy_of(replayed());
