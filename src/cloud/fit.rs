@@ -2,6 +2,7 @@
 
 use super::paths::{Measured, Path};
 use crate::signal::median;
+use crate::signal::statistics::quantile;
 use nalgebra::Point3;
 
 /// A point lies on the wood if it is no farther than this from its surface, m, ...
@@ -54,10 +55,8 @@ pub(super) fn foot_share(paths: &[Path]) -> Option<f64> {
     let lowest = lowest.map(|(_, circle)| circle.radius).take(FOOT_CIRCLES);
     let foot = median(lowest.collect(), f64::total_cmp)?;
     let all = paths.iter().flat_map(circles);
-    let mut radii: Vec<f64> = all.map(|(_, circle)| circle.radius).collect();
-    let place = (THICKEST_QUANTILE * (radii.len() - 1) as f64) as usize;
-    let thickest = *radii.select_nth_unstable_by(place, f64::total_cmp).1;
-    Some(foot / thickest)
+    let radii = all.map(|(_, circle)| circle.radius).collect();
+    Some(foot / quantile(radii, THICKEST_QUANTILE)?)
 }
 
 /// The circles of a path from its base on, and their heights, m.

@@ -219,6 +219,7 @@ fn tree_of(
     refine::refine(&mut paths, points, &detail, f64::from(cell), stretch, twig);
     paths::prune(&mut paths, least);
     let noise = radius::noise(&paths);
+    // The trunk forgets the circles at its foot when it is led down to the ground.
     figures.foot_share = fit::foot_share(&paths);
     base::stand(&mut paths, base, |at| standing.ground_at(at));
     figures.noise_m = noise;

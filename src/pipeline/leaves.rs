@@ -150,8 +150,6 @@ fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
     drawn
 }
 
-/// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is
-/// taken for bare.
 /// Whether a mask shows leaves on a tree in this outline.
 fn shows_leaves(mask: &Luma, outline: Option<&Outline>) -> bool {
     let leaves = mask.pixels.iter().filter(|p| **p > Masks::MOST_OUTSIDE);
@@ -162,6 +160,8 @@ fn shows_leaves(mask: &Luma, outline: Option<&Outline>) -> bool {
     leaves.count() as f64 >= LEAST_LEAVES * tree as f64
 }
 
+/// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is
+/// taken for bare.
 fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>) -> bool {
     let season = picture
         .zip(outline)

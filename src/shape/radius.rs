@@ -34,6 +34,11 @@ pub(super) fn sound(radius_px: f64) -> f64 {
     }
 }
 
+/// [`TIP_RADIUS_PX`] in this picture, px.
+fn tip_px(skeleton: &Skeleton) -> f64 {
+    TIP_RADIUS_PX * f64::from(skeleton.image_size.width) / 640.0
+}
+
 /// Thickness along every limb: `r = r_trunk (pipes above / pipes of the tree)^(1/e)`, where a twig
 /// that carries nothing is one pipe, and a branch one for each [`PIPE_PX`] of its length. What
 /// leaves joins gradually, so that no limb has a step, and a limb ends as thick as the one begins
@@ -50,11 +55,7 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
             total = f64::max(total, bearing.pipes(0.0));
         }
     }
-    let model = PipeModel::new(
-        sound(trunk_radius_px),
-        TIP_RADIUS_PX * width_px / 640.0,
-        total,
-    );
+    let model = PipeModel::new(sound(trunk_radius_px), tip_px(skeleton), total);
     let goes_on_from = heirs(grown, &bearing, &model);
     for (i, bearing) in bearing.iter().enumerate() {
         let (earlier, rest) = grown.split_at_mut(i);
@@ -82,7 +83,6 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
         *seen |= node.kind == NodeKind::Traced;
     }
     let goes_on = continuations(skeleton);
-    let tip_px = TIP_RADIUS_PX * f64::from(skeleton.image_size.width) / 640.0;
     for i in 0..grown.len() {
         let (earlier, rest) = grown.split_at_mut(i);
         let Some(Grown { limb, at }) = rest.first_mut() else {
@@ -95,7 +95,7 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
                 let from = parent.filter(|p| p.parent.is_some()).unwrap_or(node).radius;
                 let to = match goes_on[limb.node.index()] {
                     Some(_) => node.radius,
-                    None => node.radius.min(tip_px),
+                    None => node.radius.min(tip_px(skeleton)),
                 };
                 taper(limb, from, to);
             }

@@ -3,6 +3,7 @@
 
 use crate::small_disk::SmallDisk;
 use crate::support::{names_in, replayed};
+use crate::to_folder::{FAILED, NO_INPUT, command, done};
 use arborcam::document::Document;
 use arborcam::import::{FlatModel, read_model};
 use arborcam::model::{NodeId, Skeleton};
@@ -15,23 +16,8 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-const FAILED: i32 = 1;
-const NO_INPUT: i32 = 3;
 const STOPPED: i32 = 130;
 const DRAWING: &str = "docs/sketches/tree.svg";
-
-fn command(arguments: &[&str], out: &Path) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
-    command.args(arguments).arg("--out").arg(out);
-    command
-}
-
-fn done(arguments: &[&str], out: &Path) -> String {
-    let output = command(arguments, out).output().expect("arborcam");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{arguments:?}: {said}");
-    said
-}
 
 fn text(path: &Path) -> &str {
     path.to_str().expect("path")

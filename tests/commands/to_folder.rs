@@ -7,11 +7,16 @@ pub const FAILED: i32 = 1;
 pub const BAD_USAGE: i32 = 2;
 pub const NO_INPUT: i32 = 3;
 
-/// Runs a command that writes to `out`.
-pub fn arborcam(arguments: &[&str], out: &Path) -> Output {
+/// A command that writes to `out`.
+pub fn command(arguments: &[&str], out: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
     command.args(arguments).arg("--out").arg(out);
-    command.output().expect("arborcam")
+    command
+}
+
+/// Runs it.
+pub fn arborcam(arguments: &[&str], out: &Path) -> Output {
+    command(arguments, out).output().expect("arborcam")
 }
 
 /// Runs one that must succeed, and returns what it said.
