@@ -27,7 +27,7 @@ use crate::cancel::CancelToken;
 use crate::config::{Config, Leader};
 use crate::dynamics::{Depth, Film, analyse};
 use crate::hierarchy::{self, Evidence};
-use crate::model::{Foot, Outline, TrackId, TrackLog, TrackTable, Wood};
+use crate::model::{Foot, Outline, Skeleton, TrackId, TrackLog, TrackTable, Wood};
 use at_rest::at_rest;
 use clear::Turns;
 use nalgebra::Point2;
@@ -103,17 +103,18 @@ fn without_doubtful(
     Model { left_out, ..model }
 }
 
-/// The model with its modes: how its branches sway in `film`, whose points are on the nodes of the
-/// model's skeleton. Branches that were not looked at when `cancel` ended the work are
+/// The model with its modes: how its branches sway in `film`, whose points are on the nodes of
+/// `skeleton`. That is the model's, as its files give it back: who analyses these finds the same.
+/// Branches that were not looked at when `cancel` ended the work are
 /// [`NotInTime`](crate::model::Unidentified::NotInTime).
 pub fn with_modes(
     model: &Model,
+    skeleton: &Skeleton,
     film: &Film,
     config: &Config,
-    depth: Depth,
     cancel: &CancelToken,
 ) -> Model {
-    let analysis = analyse(&model.skeleton, film, &config.dynamics, depth, cancel);
+    let analysis = analyse(skeleton, film, &config.dynamics, Depth::Full, cancel);
     Model {
         modes: analysis.sway,
         tree_modes: analysis.modes,

@@ -1,7 +1,8 @@
 //! `camera.csv`: how the camera itself moved, frame by frame.
 
 use super::error::DocumentError;
-use super::table::{TableReader, TableWriter};
+use super::number;
+use super::table::{TIME_DECIMALS, TableReader, TableWriter};
 use crate::files::WriteError;
 use crate::model::{Agreement, Background, CameraMotion, Size, TrackSet};
 use nalgebra::{Point2, Similarity2, UnitComplex, Vector2};
@@ -15,6 +16,8 @@ pub const CAMERA_HEADER: &str =
     "frame,time_s,dx_px,dy_px,roll_deg,scale,inliers,rms_px,sd_px,background";
 
 const COLUMNS: [&str; 5] = ["time_s", "dx_px", "dy_px", "roll_deg", "scale"];
+/// Of all columns but the time.
+const DECIMALS: [usize; 4] = [4, 4, 7, 9];
 /// Scales beyond these are no camera's motion.
 const LEAST_SCALE: f64 = 0.01;
 const LARGEST_SCALE: f64 = 100.0;
@@ -43,14 +46,13 @@ impl<W: Write> CameraCsv<W> {
     /// # Errors
     /// The row cannot be written.
     pub fn set(&mut self, set: &TrackSet) -> Result<(), WriteError> {
-        let motion = &set.camera.filmed_from_steady;
         let table = &mut self.table;
         table.count(set.frame);
-        table.number(set.time_s, 6);
-        let shift_px = motion * self.middle_px - self.middle_px;
-        shift_px.iter().for_each(|px| table.number(*px, 4));
-        table.number(motion.isometry.rotation.angle().to_degrees(), 7);
-        table.number(motion.scaling(), 9);
+        table.number(set.time_s, TIME_DECIMALS);
+        let cells = cells(&set.camera, self.middle_px);
+        for (value, decimals) in cells.into_iter().zip(DECIMALS) {
+            table.number(value, decimals);
+        }
         match set.camera.background {
             Background::Seen(agreement) => agreed(table, agreement, "seen"),
             Background::Foot(agreement) => agreed(table, agreement, "foot"),
@@ -82,6 +84,35 @@ fn nothing_seen<W: Write>(table: &mut TableWriter<W>, background: &str) {
     table.text("");
     table.text("");
     table.text(background);
+}
+
+/// What the table says of a motion: `dx_px`, `dy_px`, `roll_deg` and `scale`.
+fn cells(motion: &CameraMotion, middle_px: Point2<f64>) -> [f64; 4] {
+    let motion = &motion.filmed_from_steady;
+    let shift_px = motion * middle_px - middle_px;
+    let roll_deg = motion.isometry.rotation.angle().to_degrees();
+    [shift_px.x, shift_px.y, roll_deg, motion.scaling()]
+}
+
+/// The motion of which the table says this.
+fn motion([dx_px, dy_px, roll_deg, scale]: [f64; 4], middle_px: Point2<f64>) -> CameraMotion {
+    let roll = UnitComplex::new(roll_deg.to_radians());
+    let shift = middle_px.coords + Vector2::new(dx_px, dy_px) - scale * (roll * middle_px.coords);
+    CameraMotion {
+        filmed_from_steady: Similarity2::from_parts(shift.into(), roll, scale),
+        // What is made of the points does not ask for it.
+        background: Background::Unclear,
+    }
+}
+
+/// A motion in pictures of this size as the table gives it back.
+pub(super) fn as_read(of: &CameraMotion, size: Size) -> CameraMotion {
+    let middle_px = middle_px(size);
+    let mut cells = cells(of, middle_px);
+    for (value, decimals) in cells.iter_mut().zip(DECIMALS) {
+        *value = number::as_read(*value, decimals);
+    }
+    motion(cells, middle_px)
 }
 
 /// The middle of a picture, px.
@@ -141,22 +172,16 @@ impl CameraReader {
         }
         let dx_px = table.length_px(1, "dx_px", 1.0)?;
         let dy_px = table.length_px(2, "dy_px", 1.0)?;
-        let roll = UnitComplex::new(table.number(3, "roll_deg")?.to_radians());
+        let roll_deg = table.number(3, "roll_deg")?;
         let scale = table.number(4, "scale")?;
         if !(LEAST_SCALE..=LARGEST_SCALE).contains(&scale) {
             return Err(table.bad(format!(
                 "scale is {scale}, and must be {LEAST_SCALE} to {LARGEST_SCALE}"
             )));
         }
-        let middle = self.middle_px;
-        let shift = middle.coords + Vector2::new(dx_px, dy_px) - scale * (roll * middle.coords);
         Ok(Some(CameraRow {
             time_s: table.number(0, "time_s")?,
-            motion: CameraMotion {
-                filmed_from_steady: Similarity2::from_parts(shift.into(), roll, scale),
-                // What is made of the points does not ask for it.
-                background: Background::Unclear,
-            },
+            motion: motion([dx_px, dy_px, roll_deg, scale], self.middle_px),
         }))
     }
 }

@@ -44,7 +44,7 @@ pub use number::push as push_number;
 pub use picture::{PICTURE_FILE, jpeg};
 pub use png::{grey_png, png};
 pub use table::{TableWriter, unit};
-pub use tracks::{LEFT_OUT_FILE, TRACKS_FILE, TRACKS_HEADER, TracksCsv, tracks_of};
+pub use tracks::{LEFT_OUT_FILE, TRACKS_FILE, TRACKS_HEADER, TracksCsv, film_as_read, tracks_of};
 pub use wood::{WOOD_FILE, read_wood, wood_csv};
 
 use crate::bounds::Bounds;

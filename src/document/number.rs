@@ -1,5 +1,7 @@
 //! Numbers as text, the same on every machine.
 
+use std::str::FromStr;
+
 /// Appends `x` with at most `decimals` digits after the point, no trailing zeros, no exponent and
 /// no negative zero; nothing at all for what is no number.
 pub fn push(out: &mut String, x: f64, decimals: usize) {
@@ -22,6 +24,12 @@ pub fn push(out: &mut String, x: f64, decimals: usize) {
     if &out[start..] == "-0" {
         out.remove(start);
     }
+}
+
+/// What reading the text back gives; no number for what is none.
+pub(super) fn as_read<T: FromStr + From<f32>>(x: f64, decimals: usize) -> T {
+    let written = text(x, decimals);
+    written.parse().unwrap_or_else(|_| f32::NAN.into())
 }
 
 /// The same as a text of its own.

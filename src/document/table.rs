@@ -13,6 +13,9 @@ use std::fs::File;
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
+/// Decimals of a time in seconds.
+pub(super) const TIME_DECIMALS: usize = 6;
+
 /// One CSV file while it is written: a row is put together cell by cell.
 pub struct TableWriter<W: Write> {
     what: &'static str,

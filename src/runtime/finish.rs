@@ -13,10 +13,11 @@ use crate::document::note::{
     Refinement, Software, Source, json,
 };
 use crate::document::{
-    BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, DepthNote, LEAVES_MASK_FILE, MotionCsv,
-    PICTURE_FILE, REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, jpeg, nodes,
+    BARK_FILE, CAMERA_FILE, CameraCsv, CaptureNote, DepthNote, Document, LEAVES_MASK_FILE,
+    MotionCsv, PICTURE_FILE, REST_FILE, SCHEMA_VERSION, TracksCsv, WOOD_MASK_FILE, film_as_read,
+    jpeg, nodes,
 };
-use crate::dynamics::{Depth, Film, Take};
+use crate::dynamics::Take;
 use crate::files::OutputFolder;
 use crate::model::{
     AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, TagScale, Tentative, Timing,
@@ -25,7 +26,7 @@ use crate::model::{
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
 use crate::source::SourceInfo;
-use crate::views::{DocumentWriter, Draft, SwayFound};
+use crate::views::{DocumentWriter, Draft, PrepareError, SwayFound};
 use nalgebra::Point2;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -186,14 +187,16 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     tables.catch_up(&job.tracks, cancel)?;
     let mut done = tables.finish(&job.tracks, cancel)?;
     let model = done.replay.model().clone();
-    let take = take(job, &done);
+    let note = note_of(job, &done);
+    let read = skeleton_as_read(&note, &model)?;
+    let take = take(job, &done, &read);
     let poses = std::mem::take(&mut done.poses);
     // Most of the document needs no sway, and the user who has asked for the end is waiting.
     let cancel = &job.shared.pulse.closing_work;
     let (model, writer) = beside(
         "sway",
-        || with_modes(&model, &take.film, &job.config, Depth::Full, cancel),
-        || draft(job, &done, poses),
+        || with_modes(&model, &read, &take.film, &job.config, cancel),
+        || draft(job, &done, note, poses),
     );
     warn_of_unanalysed(job, &model);
     if let Some(warning) = take.warning() {
@@ -216,19 +219,23 @@ pub fn complete(job: &CaptureJob, mut tables: CaptureTables) -> Result<Written, 
     })
 }
 
-/// The points of the last seconds on the nodes of the tree, as far as they are in one piece.
-fn take(job: &CaptureJob, done: &Done) -> Take {
-    let mut log = job.log.clone();
-    log.close();
-    let skeleton = &done.replay.model().skeleton;
-    let window = log.last(job.config.dynamics.window_s);
-    Take::of(Film::from_log(window, skeleton, |id| {
-        done.replay.node_of(id)
-    }))
+/// The tree as the files of the capture give it back.
+fn skeleton_as_read(note: &CaptureNote, tree: &Model) -> Result<Arc<Skeleton>, Failure> {
+    let read = Document::as_read(note, &tree.skeleton, &[], None);
+    Ok(read.map_err(PrepareError::from)?.skeleton)
 }
 
-/// The document but for its sway.
-fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWriter, Failure> {
+/// The points of the last seconds on the nodes of the tree, as the files of the capture give them back,
+/// and as far as they are in one piece.
+fn take(job: &CaptureJob, done: &Done, skeleton: &Skeleton) -> Take {
+    let mut log = job.log.clone();
+    log.close();
+    let window = log.last(job.config.dynamics.window_s);
+    Take::of(film_as_read(window, skeleton, |id| done.replay.node_of(id)))
+}
+
+/// What is known of the capture before its sway.
+fn note_of(job: &CaptureJob, done: &Done) -> CaptureNote {
     let tree = &**done.replay.model();
     let model = ModelNote {
         push: Some(tree.push_figures(&job.config)),
@@ -236,6 +243,17 @@ fn draft(job: &CaptureJob, done: &Done, poses: Vec<Pose>) -> Result<DocumentWrit
     };
     let mut note = describe(job, Some(tree), Some(model));
     note.quality.median_reprojection_px = done.misses.median();
+    note
+}
+
+/// The document but for its sway.
+fn draft(
+    job: &CaptureJob,
+    done: &Done,
+    note: CaptureNote,
+    poses: Vec<Pose>,
+) -> Result<DocumentWriter, Failure> {
+    let tree = &**done.replay.model();
     Ok(DocumentWriter::new(Draft {
         note,
         skeleton: &tree.skeleton,
