@@ -236,7 +236,7 @@ fn analyse_capture(
         .collect();
     let cut = take.cut();
     let note = &document.note;
-    let renewed = note.judgement_with(&skeleton, &analysis.sway, cut);
+    let renewed = note.judgement_with(&skeleton, &analysis.sway, &analysis.modes, cut);
     let renewed = renewed.filter(|_| args.update).map(|j| j.verdict);
     let mut study = Study::of(&Given {
         name,

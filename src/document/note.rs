@@ -6,7 +6,7 @@ use crate::config::{Config, STROKE_POINTS};
 use crate::files::WriteError;
 use crate::model::{
     CaptureFacts, FilmCut, Judgement, LocalTime, Origin, Outline, Skeleton, SwayFacts, Swaying,
-    TagScale, Timing, UserNotes, Verdict,
+    TagScale, Timing, TreeMode, UserNotes, Verdict,
 };
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
@@ -481,17 +481,18 @@ impl CaptureNote {
         self.leaves.as_ref().map_or(&[], |leaves| &leaves.rgb)
     }
 
-    /// What the capture is worth by other answers on its sway, by node index, in a film that was
-    /// found to be `cut`; `None` where it is not known what it was judged by.
+    /// What the capture is worth by other answers on its sway, by node index, and other modes, in a film
+    /// that was found to be `cut`; `None` where it is not known what it was judged by.
     pub fn judgement_with(
         &self,
         skeleton: &Skeleton,
         sway: &[Swaying],
+        modes: &[TreeMode],
         cut: Option<FilmCut>,
     ) -> Option<Judgement> {
         let facts = self.judged_by.clone()?;
         let facts = CaptureFacts {
-            sway: SwayFacts::of(skeleton, sway),
+            sway: SwayFacts::of(skeleton, sway, modes.iter().map(|mode| mode.sway)),
             ..facts
         };
         Some(Judgement::of(facts.with_cut(cut)))

@@ -1,7 +1,7 @@
 //! What is known of a capture when it is judged, and what of it is not as it should be.
 
 use super::verdict::{Finding, Grade};
-use super::{FootBasis, NodeId, Skeleton, Swaying, Unidentified};
+use super::{Excitation, FootBasis, NodeId, Skeleton, Sway, Swaying, Unidentified};
 use serde::{Deserialize, Serialize};
 
 /// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
@@ -10,6 +10,11 @@ const PERIODS_NEEDED: f64 = 10.0;
 /// What is to be filmed where no frequency is known, s: ten periods at 0.33 Hz, the slowest sway of
 /// a full-grown tree.
 const NEEDED_S: f64 = 30.0;
+/// The trunk's frequency in wind is to be known within this share of it, either way: what ten periods
+/// are meant to give. Its interval shrinks with the root of the length of the film.
+const TRUNK_WITHIN: f64 = 0.05;
+/// A longer film is not looked at as a whole, s (`dynamics.window_s`, unless it is changed).
+const LONGEST_S: f64 = 60.0;
 /// Below this share of the length that is needed a film is poor: two or three periods tell a
 /// release, and no wind.
 const POOR_SHARE: f64 = 0.4;
@@ -115,6 +120,14 @@ pub struct SwayFacts {
     pub identified: usize,
     /// The trunk's own frequency, Hz.
     pub trunk_hz: Option<f64>,
+    /// Half of its 95 % interval in wind, as a share of it; `None` after a release, which no longer film
+    /// makes surer.
+    #[serde(default)]
+    pub trunk_within: Option<f64>,
+    /// The slowest mode that is surely slower than the trunk's, Hz. The trunk carries all, and what sways
+    /// as a whole sways slowest, but for a stout trunk with limp branches.
+    #[serde(default)]
+    pub slower_hz: Option<f64>,
 }
 
 /// How a camera shakes.
@@ -134,15 +147,27 @@ impl Shake {
 }
 
 impl SwayFacts {
-    /// What was found of the sway, by node index; `None` where some of it was not looked at.
-    pub fn of(skeleton: &Skeleton, modes: &[Swaying]) -> Option<Self> {
+    /// What was found of the sway, by node index, and of the modes of the whole tree; `None` where some of
+    /// it was not looked at.
+    pub fn of(
+        skeleton: &Skeleton,
+        sways: &[Swaying],
+        modes: impl Iterator<Item = Sway>,
+    ) -> Option<Self> {
         let mut facts = Self::default();
-        if let Some(trunk) = trunk(skeleton) {
-            let sway = modes.get(trunk.index())?.as_ref().ok();
-            facts.trunk_hz = sway.map(|sway| sway.frequency_hz.value);
+        if let Some(trunk) = trunk(skeleton)
+            && let Ok(sway) = sways.get(trunk.index())?
+        {
+            let own = sway.frequency_hz;
+            facts.trunk_hz = Some(own.value);
+            facts.trunk_within = (sway.excitation == Excitation::Wind).then(|| own.within());
+            let slower = modes
+                .map(|mode| mode.frequency_hz)
+                .filter(|hz| hz.hi < own.lo);
+            facts.slower_hz = slower.map(|hz| hz.value).min_by(f64::total_cmp);
         }
         for node in skeleton.measured_branches() {
-            match modes.get(node.index())? {
+            match sways.get(node.index())? {
                 Err(Unidentified::NotInTime) => return None,
                 Err(Unidentified::NotMeasured) => continue,
                 Err(_) => {}
@@ -192,6 +217,8 @@ impl CaptureFacts {
             self.has_few_frames(),
             self.moves_little(),
             self.is_short(),
+            self.is_unsure_of_trunk(),
+            self.has_slower_than_trunk(),
             self.loses_points(),
             self.has_no_foot(),
             self.is_not_alone(),
@@ -206,11 +233,25 @@ impl CaptureFacts {
 
     /// What is still to be filmed for the frequencies of the branches, s; 0 where nothing is.
     pub fn missing_s(&self) -> f64 {
-        let missing_s = self.needed_s() - self.filmed_s;
+        let missing_s = self
+            .missing_for_branches_s()
+            .max(self.missing_for_trunk_s());
         if missing_s < LENGTH_SLACK_S {
             return 0.0;
         }
         missing_s
+    }
+
+    fn missing_for_branches_s(&self) -> f64 {
+        self.needed_s() - self.filmed_s
+    }
+
+    /// What is still to be filmed in wind for the trunk to be known well enough, s, as far as that is
+    /// looked at.
+    fn missing_for_trunk_s(&self) -> f64 {
+        let within = self.sway.and_then(|sway| sway.trunk_within);
+        let share = within.map_or(0.0, |within| within / TRUNK_WITHIN);
+        (share * share * self.filmed_s).min(LONGEST_S) - self.filmed_s
     }
 
     /// What had to be filmed, s.
@@ -300,7 +341,7 @@ impl CaptureFacts {
 
     fn is_short(&self) -> Option<Finding> {
         let needed_s = self.needed_s();
-        if self.missing_s() <= 0.0 {
+        if self.missing_for_branches_s() < LENGTH_SLACK_S {
             return None;
         }
         let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
@@ -310,6 +351,38 @@ impl CaptureFacts {
             grade,
             reason: format!("{filmed_s:.0} of {needed_s:.0} s filmed"),
             advice: format!("film {:.0} s more", (needed_s - filmed_s).max(1.0)),
+        })
+    }
+
+    fn is_unsure_of_trunk(&self) -> Option<Finding> {
+        let within = self.sway?.trunk_within?;
+        if within <= TRUNK_WITHIN {
+            return None;
+        }
+        let missing_s = self.missing_for_trunk_s().round();
+        Some(Finding {
+            grade: Grade::Fair,
+            reason: format!(
+                "the trunk's frequency is known to {:.1} % only",
+                100.0 * within
+            ),
+            advice: match missing_s >= LENGTH_SLACK_S {
+                true => format!("film {missing_s:.0} s more"),
+                false => "pull the tree and release it".into(),
+            },
+        })
+    }
+
+    fn has_slower_than_trunk(&self) -> Option<Finding> {
+        let sway = self.sway?;
+        let (trunk_hz, slower_hz) = (sway.trunk_hz?, sway.slower_hz?);
+        Some(Finding {
+            grade: Grade::Fair,
+            reason: format!(
+                "a part sways at {slower_hz:.2} Hz, slower than the trunk at {trunk_hz:.2} Hz, which is rare: one of \
+                 the two may be wrong"
+            ),
+            advice: "pull the tree and release it".into(),
         })
     }
 
@@ -383,7 +456,7 @@ impl CaptureFacts {
 mod tests {
     use super::*;
     use crate::bounds::Bounds;
-    use crate::model::{Excitation, Interval, Node, Size, Sway};
+    use crate::model::{Interval, Node, Size};
 
     fn sway(hz: f64) -> Swaying {
         let Bounds { lo, hi } = Bounds::new(0.95 * hz, 1.05 * hz);
@@ -413,10 +486,22 @@ mod tests {
             image_size: Size::new(64, 64),
         };
         let none = Err(Unidentified::NotMeasured);
-        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)]).expect("facts");
+        let slow = || sway(0.4).into_iter();
+        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)], slow()).expect("facts");
         assert_eq!((facts.identified, facts.trunk_hz), (2, Some(0.5)));
+        assert!(
+            facts
+                .trunk_within
+                .is_some_and(|share| (share - 0.05).abs() < 1e-9)
+        );
+        // Its interval and that of 0.5 Hz have nothing in common.
+        assert_eq!(facts.slower_hz, Some(0.4));
+        let near = sway(0.46).into_iter();
+        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)], near).expect("facts");
+        assert_eq!(facts.slower_hz, None);
         let silent = Err(Unidentified::TooUncertain);
-        let facts = SwayFacts::of(&tree, &[none, silent, sway(0.8)]).expect("facts");
+        let facts = SwayFacts::of(&tree, &[none, silent, sway(0.8)], slow()).expect("facts");
         assert_eq!((facts.branches, facts.trunk_hz), (2, None));
+        assert_eq!((facts.trunk_within, facts.slower_hz), (None, None));
     }
 }

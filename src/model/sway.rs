@@ -19,6 +19,11 @@ impl Interval {
         self.lo <= x && x <= self.hi
     }
 
+    /// Half of its width as a share of the value.
+    pub fn within(&self) -> f64 {
+        0.5 * (self.hi - self.lo) / self.value
+    }
+
     /// Whether some value is in both.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.lo <= other.hi && other.lo <= self.hi

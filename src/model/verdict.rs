@@ -166,6 +166,8 @@ mod tests {
                 branches: 12,
                 identified: 5,
                 trunk_hz: Some(0.5),
+                trunk_within: Some(0.04),
+                slower_hz: None,
             }),
             shake: None,
             is_camera_unknown: false,
@@ -186,6 +188,16 @@ mod tests {
             branches: 12,
             identified,
             trunk_hz,
+            ..SwayFacts::default()
+        })
+    }
+
+    /// What was found in wind, where the trunk is known within a share of its frequency.
+    fn in_wind(trunk_within: f64) -> Option<SwayFacts> {
+        let found = sway(5, Some(0.5))?;
+        Some(SwayFacts {
+            trunk_within: Some(trunk_within),
+            ..found
         })
     }
 
@@ -207,6 +219,29 @@ mod tests {
             |f| (f.amplitude_px, f.sway) = (Some(0.1), sway(0, None)),
             "poor, because: moves by 0.1 px only; no frequency identified. To do: come nearer, \
              or film in more wind",
+        );
+        check(
+            "wind that tells the trunk roughly",
+            |f| (f.filmed_s, f.sway) = (40.0, in_wind(0.06)),
+            "fair, because: the trunk's frequency is known to 6.0 % only. To do: film 18 s more",
+        );
+        check(
+            "a minute of it",
+            |f| (f.filmed_s, f.sway) = (60.0, in_wind(0.08)),
+            "fair, because: the trunk's frequency is known to 8.0 % only. To do: pull the tree and \
+             release it",
+        );
+        check(
+            "a limb slower than the trunk",
+            |f| {
+                let found = in_wind(0.04);
+                f.sway = found.map(|sway| SwayFacts {
+                    slower_hz: Some(0.41),
+                    ..sway
+                });
+            },
+            "fair, because: a part sways at 0.41 Hz, slower than the trunk at 0.50 Hz, which is \
+             rare: one of the two may be wrong. To do: pull the tree and release it",
         );
         check(
             "12 s of wind that tell nothing",

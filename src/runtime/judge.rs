@@ -85,10 +85,15 @@ pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
         settings: &job.config.dynamics,
         brightness: job.picture.as_ref().and_then(mean_grey),
         foot: tree.map(|tree| tree.foot),
-        sway: tree.and_then(|tree| SwayFacts::of(&tree.skeleton, &tree.modes)),
+        sway: tree.and_then(sway_facts),
         cut: take.cut(),
     };
     Judgement::of(film.facts())
+}
+
+fn sway_facts(tree: &Model) -> Option<SwayFacts> {
+    let modes = tree.tree_modes.iter().map(|mode| mode.sway);
+    SwayFacts::of(&tree.skeleton, &tree.modes, modes)
 }
 
 /// Mean grey of a picture, 0 to 255; `None` without a pixel.

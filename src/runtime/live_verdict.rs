@@ -78,12 +78,13 @@ impl LiveVerdict {
     /// What the newest answer says of the branches that the tree has now.
     pub fn sway_facts(&self, model: &Model) -> Option<SwayFacts> {
         let sway = self.sway.as_deref()?;
-        let mut modes = Vec::with_capacity(model.skeleton.nodes.len());
+        let mut sways = Vec::with_capacity(model.skeleton.nodes.len());
         for node in &model.skeleton.nodes {
             let branch = sway.branches.get(&node.name);
-            modes.push(branch.map_or(Err(Unidentified::NotMeasured), |branch| branch.swaying));
+            sways.push(branch.map_or(Err(Unidentified::NotMeasured), |branch| branch.swaying));
         }
-        SwayFacts::of(&model.skeleton, &modes)
+        let of_tree = sway.modes.iter().map(|mode| mode.sway);
+        SwayFacts::of(&model.skeleton, &sways, of_tree)
     }
 
     /// `None` in the first second.

@@ -186,7 +186,7 @@ pub fn update(dir: &Path, found: SwayFound, stop: &AtomicBool) -> Result<(), Pre
         put(&dir.join(MODEL_FILE), &model, stop)?;
     }
     let Document { note, skeleton, .. } = &mut tree.document;
-    if let Some(judgement) = note.judgement_with(skeleton, found.sway, found.cut) {
+    if let Some(judgement) = note.judgement_with(skeleton, found.sway, found.modes, found.cut) {
         note.take_judgement(judgement);
         put(&dir.join(NOTE_FILE), &json(note)?, stop)?;
     }

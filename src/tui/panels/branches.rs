@@ -20,6 +20,8 @@ const SURE: usize = 13;
 const COLUMNS: [(&str, usize); 2] = [("pts", 5), ("ampl/px", 7)];
 /// A narrower table has the name and the sway alone.
 const ALL_FROM: u16 = 56;
+/// And one that is narrower yet the frequency alone: names would be cut to what many have in common.
+const DAMPING_FROM: u16 = 44;
 /// Columns that stay free about a title, and between it and the modes.
 const AROUND_TITLE: usize = 5;
 /// Stands behind the frequencies of the modes.
@@ -136,8 +138,9 @@ fn branch(s: &Snapshot, b: &BranchRow, marked: bool, width: u16, theme: Theme) -
     } else {
         String::new()
     };
-    let (sway, style) = sway(s, b, theme);
-    let others = middle.chars().count() + 2 * (SURE + 1) + 3;
+    let has_damping = width >= DAMPING_FROM;
+    let (sway, style) = sway(s, b, has_damping, theme);
+    let others = middle.chars().count() + self::width(&sway) + 3;
     let name = shortened(&b.name, (width as usize).saturating_sub(others));
     let used = name.chars().count() + others;
     let gap = " ".repeat((width as usize).saturating_sub(used));
@@ -161,30 +164,33 @@ fn shortened(name: &str, most: usize) -> String {
     std::iter::once('…').chain(end).collect()
 }
 
-/// Frequency and damping with half their intervals, or why there are none.
-fn sway(s: &Snapshot, b: &BranchRow, theme: Theme) -> (String, Style) {
-    const WIDTH: usize = 2 * (SURE + 1);
+/// Frequency and, where it has a column, damping with half their intervals, or why there are none.
+fn sway(s: &Snapshot, b: &BranchRow, has_damping: bool, theme: Theme) -> (String, Style) {
+    let room = (SURE + 1) * (1 + usize::from(has_damping));
     let branch = s.sway.as_ref().and_then(|s| s.branches.get(&b.node));
-    match branch.map(|branch| branch.swaying) {
+    let (text, style) = match branch.map(|branch| branch.swaying) {
         Some(Ok(sway)) => {
-            let damping = sway
-                .damping_ratio
-                .map_or_else(|| "–".to_owned(), |d| plus_minus(&d));
-            (
-                format!(
-                    " {:>SURE$} {damping:>SURE$}",
-                    plus_minus(&sway.frequency_hz)
-                ),
-                theme.strong(),
-            )
+            let damping = sway.damping_ratio.as_ref();
+            let damping = damping.map_or_else(|| "–".to_owned(), plus_minus);
+            let cells = [plus_minus(&sway.frequency_hz), damping];
+            (columns(&cells, has_damping), theme.strong())
         }
         Some(Err(why)) => {
             let moves_with = branch.map_or(&[][..], |branch| &branch.moves_with);
-            let why = in_short(why, moves_with, WIDTH - 1);
-            (format!("{why:>WIDTH$}"), theme.faint())
+            (in_short(why, moves_with, room - 1), theme.faint())
         }
-        None => (format!(" {:>SURE$} {:>SURE$}", "–", "–"), theme.faint()),
-    }
+        None => {
+            let unknown = ["–", "–"].map(str::to_owned);
+            (columns(&unknown, has_damping), theme.faint())
+        }
+    };
+    (format!("{text:>room$}"), style)
+}
+
+/// The columns of the sway, those that there are.
+fn columns(cells: &[String; 2], has_damping: bool) -> String {
+    let shown = &cells[..1 + usize::from(has_damping)];
+    shown.iter().map(|cell| format!(" {cell:>SURE$}")).collect()
 }
 
 /// Two or three words of at most so many letters; the branch's own panel has them all.
@@ -198,17 +204,18 @@ fn in_short(why: Unidentified, moves_with: &[Participation], room: usize) -> Str
         }
         return format!("with {} Hz", value(most.frequency_hz));
     }
-    let words = match why {
-        Unidentified::NotMeasured => "not measured",
-        Unidentified::TooShort => "film too short",
-        Unidentified::TooLittleMotion => "too little motion",
-        Unidentified::AncestorsSway => "moves with its parent",
-        Unidentified::AboveSampling => "too fast for the frames",
-        Unidentified::NoOscillation => "no oscillation",
-        Unidentified::TooUncertain => "too uncertain",
-        Unidentified::NotInTime => "not in time",
+    let (words, fewer) = match why {
+        Unidentified::NotMeasured => ("not measured", "not measured"),
+        Unidentified::TooShort => ("film too short", "too short"),
+        Unidentified::TooLittleMotion => ("too little motion", "moves little"),
+        Unidentified::AncestorsSway => ("moves with its parent", "as its parent"),
+        Unidentified::AboveSampling => ("too fast for the frames", "too fast"),
+        Unidentified::NoOscillation => ("no oscillation", "no own swing"),
+        Unidentified::TooUncertain => ("too uncertain", "too uncertain"),
+        Unidentified::NotInTime => ("not in time", "not in time"),
     };
-    words.to_owned()
+    let shown = if width(words) <= room { words } else { fewer };
+    shown.to_owned()
 }
 
 /// The frequencies of the tree's modes, as many as there is room for.
@@ -236,7 +243,10 @@ fn names(frame: &mut Frame, area: Rect, taken: u16, theme: Theme) {
     } else {
         Vec::new()
     };
-    names.extend([("f/Hz", SURE), ("damping", SURE)]);
+    names.push(("f/Hz", SURE));
+    if area.width >= DAMPING_FROM {
+        names.push(("damping", SURE));
+    }
     let mut end = area.right();
     for (name, width) in names.into_iter().rev() {
         let own = name.chars().count() as u16;

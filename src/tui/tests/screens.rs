@@ -205,7 +205,7 @@ fn looks_as_reviewed() {
             insta::assert_snapshot!(format!("{name}_{width}x{height}"), screen);
         }
     }
-    for (width, height) in [(100, 30), (160, 50)] {
+    for (width, height) in [(60, 20), (100, 30), (160, 50)] {
         let screen = drawn(&state(snapshot(Phase::Live)), Depth::None, width, height);
         insta::assert_snapshot!(format!("live_{width}x{height}"), screen);
     }
