@@ -78,6 +78,16 @@ impl BranchTree {
         std::iter::successors(below(&branch), below)
     }
 
+    /// The same with `trunk`, which all sways with: what seems to stand beside it on the foot, by a
+    /// skeleton that need not be right, may well be carried by it. Of the trunk itself none but the foot.
+    pub fn carriers_with(&self, trunk: NodeId, branch: NodeId) -> Vec<NodeId> {
+        let mut carriers: Vec<NodeId> = self.carriers(branch).collect();
+        if branch != trunk && !carriers.contains(&trunk) {
+            carriers.push(trunk);
+        }
+        carriers
+    }
+
     /// The points of `film`, which are on nodes of the skeleton, on branches of this tree.
     pub fn film<'a>(&self, film: &'a Film) -> Cow<'a, Film> {
         let is_same = |t: &FilmTrack| self.branch_of(t.node).is_none_or(|b| b == t.node);

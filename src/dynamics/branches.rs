@@ -163,16 +163,21 @@ pub(super) trait BranchEstimator {
     fn estimate(&mut self, branch: &BranchInFilm) -> Swaying;
 }
 
-/// The sway of every branch, the nearest to the foot first; `members` are the points of each and of
-/// all above it.
+/// The sway of every branch, that of the trunk first, then the nearest to the foot first; `members` are
+/// the points of each and of all above it.
 pub(super) fn from_the_trunk_up(
     tree: &BranchTree,
     members: &[Vec<usize>],
+    trunk: NodeId,
     cancel: &CancelToken,
     estimator: &mut impl BranchEstimator,
 ) -> Vec<Swaying> {
     let mut out = vec![Err(Unidentified::NotMeasured); members.len()];
-    for (i, (branch, tracks)) in tree.branches.iter().zip(members).enumerate().skip(1) {
+    let others = (1..tree.len()).filter(|i| *i != trunk.index());
+    for i in std::iter::once(trunk.index()).chain(others) {
+        let (Some(branch), Some(tracks)) = (tree.branches.get(i), members.get(i)) else {
+            continue;
+        };
         if tracks.is_empty() {
             continue;
         }

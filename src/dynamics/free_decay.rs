@@ -122,7 +122,7 @@ pub(super) fn sways(tree: &BranchTree, usable: &UsableFilm, cancel: &CancelToken
         mixed: vec![None; members.len()],
         trunk_is_known: false,
     };
-    from_the_trunk_up(tree, members, cancel, &mut estimator)
+    from_the_trunk_up(tree, members, *trunk, cancel, &mut estimator)
 }
 
 struct FreeDecay<'a> {
@@ -254,11 +254,7 @@ impl FreeDecay<'_> {
 
     /// Fits the modes of the ancestors and as many more as the points carry.
     fn fit(&self, node: NodeId, points: &Points) -> FittedModes {
-        let mut carriers: Vec<NodeId> = self.tree.carriers(node).collect();
-        // All sways with the trunk: what seems to stand beside it on the foot, too.
-        if node != self.trunk && !carriers.contains(&self.trunk) {
-            carriers.push(self.trunk);
-        }
+        let carriers = self.tree.carriers_with(self.trunk, node);
         let known = carriers.iter().filter_map(|above| self.own[above.index()]);
         let ancestors: Vec<BranchMode> = known.collect();
         let times_s = self.film.times_s.iter();

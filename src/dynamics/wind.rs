@@ -120,7 +120,7 @@ pub(super) fn sways(
         cancel,
     };
     estimator.fundamental = estimator.whole_tree();
-    from_the_trunk_up(tree, members, cancel, &mut estimator)
+    from_the_trunk_up(tree, members, trunk, cancel, &mut estimator)
 }
 
 /// What the analysis of a branch leaves for those on it.
@@ -289,18 +289,10 @@ impl InWind<'_> {
         of_carrier.filter(|k| !branch.tracks.contains(k)).collect()
     }
 
-    /// The modes of the nearest ancestors that have one. What stands beside the trunk on the foot,
-    /// by a skeleton that need not be right, may well be carried by it.
+    /// The modes of the nearest ancestors that have one.
     fn ancestors(&self, branch: &BranchInFilm) -> Vec<BranchMode> {
-        let node = branch.node;
         let mut out = Vec::new();
-        if let Some((whole_tree, _)) = &self.fundamental
-            && branch.is_on_foot()
-            && node != self.trunk
-        {
-            out.push(*whole_tree);
-        }
-        for above in self.tree.carriers(node) {
+        for above in self.tree.carriers_with(self.trunk, branch.node) {
             if let Known::Mode(mode) = self.known[above.index()] {
                 out.push(mode);
             }
