@@ -152,6 +152,9 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         (config.wood.seed, config.wind.seed) = (args.seed, args.seed);
     })?;
     let shown = args.picture.read(&config.camera)?;
+    if let Some(warning) = shown.warning() {
+        eprint_line(&format!("arborcam: warning: {}: {warning}", shown.name));
+    }
     let mut drawn = args.strokes.on(&shown)?;
     let options = PhotoOptions {
         leaf_colour: args.foliage.map(LeafColour::from),
@@ -187,6 +190,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         };
         let new = PhotoTree::new(parts, growth, config.clone());
         let mut new = new.map_err(|e| failure(&shown, own, e))?;
+        new.tree.note.warnings.extend(shown.warning());
         new.tree.note.warnings.extend(found_note(tree, own));
         new.tree.note.warnings.extend(warnings_of(tree));
         trees.push(new);

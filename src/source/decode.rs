@@ -1,7 +1,7 @@
 //! Raw frames to pictures: luma for the tracker, a small one in colour for the screen.
 
 use crate::model::{Luma, PixelFormat, RawFrame, Rgb, Size, brightness};
-use turbojpeg::{Decompressor, Image, ScalingFactor};
+use turbojpeg::{Colorspace, Decompressor, Image, ScalingFactor};
 
 /// Some cheap cameras leave a few filling bytes before the end mark of every picture. They are
 /// harmless; more of them are what is left when a damaged picture has been read out of step.
@@ -198,6 +198,37 @@ fn new_jpeg() -> Result<Decompressor, DecodeError> {
     Decompressor::new().map_err(|e| DecodeError::Unavailable {
         what: e.to_string(),
     })
+}
+
+/// What of a JPEG the library finds damaged and goes on after; `None` of a sound one, and of one that it does
+/// not read at all. Nothing is kept of the picture, which is decoded as small as can be.
+pub(super) fn jpeg_damage(bytes: &[u8]) -> Option<String> {
+    const SMALLEST: ScalingFactor = ScalingFactor::ONE_EIGHTH;
+    let mut jpeg = Decompressor::new().ok()?;
+    let header = jpeg.read_header(bytes).ok()?;
+    jpeg.set_scaling_factor(SMALLEST).ok()?;
+    let [width, height] = [header.width, header.height].map(|side| SMALLEST.scale(side));
+    // The library makes neither colours nor grey of printing inks.
+    let format = match header.colorspace {
+        Colorspace::CMYK | Colorspace::YCCK => turbojpeg::PixelFormat::CMYK,
+        _ => turbojpeg::PixelFormat::RGB,
+    };
+    let pitch = width * format.size();
+    let mut pixels = vec![0; pitch * height];
+    let output = Image {
+        pixels: pixels.as_mut_slice(),
+        width,
+        pitch,
+        height,
+        format,
+    };
+    let complaint = jpeg.decompress(bytes, output).err()?.to_string();
+    // As libjpeg words it: other complaints are of marks that are unusual, and of no pixel.
+    let begin = ["Corrupt JPEG data: ", "Premature end "]
+        .into_iter()
+        .find_map(|begin| complaint.find(begin))?;
+    let what = &complaint[begin..];
+    (!is_filling(what)).then(|| what.trim_start_matches("Corrupt JPEG data: ").to_owned())
 }
 
 /// Whether the library only complains about a few bytes before the end mark, after the whole

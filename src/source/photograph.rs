@@ -1,9 +1,10 @@
 //! One photograph: PNG, JPEG or BMP, turned upright, and reduced where it is large.
 
+use super::decode::jpeg_damage;
 use crate::model::{Rgb, Size};
 use image::imageops::{FilterType, resize};
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits, RgbImage};
-use std::io::Cursor;
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, RgbImage};
+use std::io::{Cursor, ErrorKind};
 
 /// Pixels of a photograph that are read, at most.
 const MOST_PIXELS: u64 = 64_000_000;
@@ -19,6 +20,9 @@ pub struct Photograph {
     pub picture: Rgb,
     /// As it is seen, before it was reduced.
     pub full_size: Size,
+    /// What the decoder of a JPEG complains of that is damaged, and went on after: a part of the picture is
+    /// not what the camera saw.
+    pub damage: Option<String>,
 }
 
 /// What a HEIC file says to be (ISO/IEC 23008-12).
@@ -33,8 +37,10 @@ pub enum PhotographError {
     BadFormat { what: String },
     #[error("it is a {format} picture, which is not read; save it as PNG or JPEG, and give that")]
     OtherFormat { format: &'static str },
-    #[error("it is damaged: the JPEG is cut off before its end; copy or export it anew")]
-    CutOff,
+    #[error("it is damaged: the {format} is cut off before its end; copy or export it anew")]
+    CutOff { format: &'static str },
+    #[error("it is damaged: the {format} cannot be decoded to its end; copy or export it anew")]
+    Damaged { format: &'static str },
     #[error("it has {megapixels} megapixels, and at most 64 are read; reduce it")]
     TooLarge { megapixels: u64 },
     #[error("it is {size} px, and must have 64 px a side at least; give a larger one")]
@@ -48,17 +54,21 @@ impl Photograph {
     /// # Errors
     /// It is damaged, of another format, too large or too small.
     pub fn read(bytes: &[u8]) -> Result<Self, PhotographError> {
-        match image_format(bytes) {
+        let Some(format) = image_format(bytes) else {
+            return Err(bad_format("its first bytes are those of no known format"));
+        };
+        match format {
             // The decoder fills what is missing with grey, and does not say so.
-            Some("JPEG") if is_cut_off(bytes) => return Err(PhotographError::CutOff),
-            None | Some("JPEG" | "PNG" | "BMP") => {}
-            Some(format) => return Err(PhotographError::OtherFormat { format }),
+            "JPEG" if is_cut_off(bytes) => return Err(PhotographError::CutOff { format }),
+            "JPEG" | "PNG" | "BMP" => {}
+            _ => return Err(PhotographError::OtherFormat { format }),
         }
+        let not_read = |e| not_read(format, e);
         let mut reader = ImageReader::new(Cursor::new(bytes))
             .with_guessed_format()
             .map_err(bad_format)?;
         reader.limits(Limits::no_limits());
-        let mut decoder = reader.into_decoder().map_err(bad_format)?;
+        let mut decoder = reader.into_decoder().map_err(not_read)?;
         let (width, height) = decoder.dimensions();
         let pixels = u64::from(width) * u64::from(height);
         if pixels > MOST_PIXELS {
@@ -68,8 +78,12 @@ impl Photograph {
         }
         let size = Size::new(width, height);
         refuse_small(size)?;
-        let orientation = decoder.orientation().map_err(bad_format)?;
-        let mut image = DynamicImage::from_decoder(decoder).map_err(bad_format)?;
+        let orientation = decoder.orientation().map_err(not_read)?;
+        let damage = match format {
+            "JPEG" => jpeg_damage(bytes),
+            _ => None,
+        };
+        let mut image = DynamicImage::from_decoder(decoder).map_err(not_read)?;
         let longest = width.max(height);
         if longest > LONGEST_SIDE_PX {
             image = image.resize(LONGEST_SIDE_PX, LONGEST_SIDE_PX, FilterType::Triangle);
@@ -83,6 +97,7 @@ impl Photograph {
         };
         Ok(Self {
             full_size,
+            damage,
             picture: Rgb {
                 size: Size::new(rgb.width(), rgb.height()),
                 pixels: rgb.into_raw(),
@@ -112,6 +127,7 @@ impl Photograph {
         };
         Ok(Self {
             full_size,
+            damage: None,
             picture: Rgb {
                 size: Size::new(reduced.width(), reduced.height()),
                 pixels: reduced.into_raw(),
@@ -170,6 +186,17 @@ fn is_cut_off(bytes: &[u8]) -> bool {
     at >= bytes.len()
 }
 
+/// Why a file that begins as a picture of this format is not read.
+fn not_read(format: &'static str, e: ImageError) -> PhotographError {
+    match e {
+        ImageError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => {
+            PhotographError::CutOff { format }
+        }
+        ImageError::Decoding(_) => PhotographError::Damaged { format },
+        e => bad_format(e),
+    }
+}
+
 fn bad_format(e: impl std::fmt::Display) -> PhotographError {
     PhotographError::BadFormat {
         what: e.to_string().replace('\n', " "),
@@ -182,9 +209,24 @@ mod tests {
     use image::{ExtendedColorType, ImageEncoder, Rgb as Pixel, RgbImage};
 
     fn png(image: &DynamicImage) -> Vec<u8> {
+        encoded(image, ImageFormat::Png)
+    }
+
+    fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
-        image.write_to(&mut bytes, ImageFormat::Png).expect("png");
+        image.write_to(&mut bytes, format).expect("encoded");
         bytes.into_inner()
+    }
+
+    /// A picture with detail everywhere, so that every byte of its file counts.
+    fn busy() -> DynamicImage {
+        let mut noise = 1_u32;
+        let pixels = RgbImage::from_fn(320, 240, |_, _| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let [a, b, c, _] = noise.to_be_bytes();
+            Pixel([a, b, c])
+        });
+        pixels.into()
     }
 
     /// Red above, blue below.
@@ -244,10 +286,7 @@ mod tests {
 
     #[test]
     fn a_jpeg_that_is_cut_off_is_damaged_wherever_that_is() {
-        let mut bytes = Cursor::new(Vec::new());
-        let image = DynamicImage::from(halves(200, 100));
-        image.write_to(&mut bytes, ImageFormat::Jpeg).expect("jpeg");
-        let mut whole = bytes.into_inner();
+        let mut whole = encoded(&halves(200, 100).into(), ImageFormat::Jpeg);
         assert!(Photograph::read(&whole).is_ok());
         for kept in [4, 30, whole.len() / 2, whole.len() - 20, whole.len() - 1] {
             let error = Photograph::read(&whole[..kept]).expect_err("cut off");
@@ -256,6 +295,42 @@ mod tests {
         // What phones add behind the picture is none of it.
         whole.extend([0xff, 0xda, 1, 2, 3]);
         assert!(Photograph::read(&whole).is_ok());
+    }
+
+    #[test]
+    fn a_jpeg_that_is_damaged_within_is_read_and_said_to_be() {
+        let mut whole = encoded(&busy(), ImageFormat::Jpeg);
+        assert_eq!(Photograph::read(&whole).expect("a photograph").damage, None);
+        for grey in [DynamicImage::from(busy().to_luma8()), halves(80, 70).into()] {
+            let bytes = encoded(&grey, ImageFormat::Jpeg);
+            assert_eq!(Photograph::read(&bytes).expect("a photograph").damage, None);
+        }
+        let (middle, end) = (whole.len() / 2, whole.len() - 2);
+        let mut hole = whole.clone();
+        hole[middle..middle + 500].fill(0);
+        whole[middle..end].fill(0);
+        for bytes in [hole, whole] {
+            let read = Photograph::read(&bytes).expect("a photograph");
+            assert_eq!(read.picture.size, Size::new(320, 240));
+            assert!(read.damage.is_some());
+        }
+    }
+
+    #[test]
+    fn other_pictures_that_are_damaged_are_refused_as_such() {
+        for format in [ImageFormat::Png, ImageFormat::Bmp] {
+            let whole = encoded(&busy(), format);
+            for kept in [whole.len() / 2, whole.len() - 20] {
+                let error = Photograph::read(&whole[..kept]).expect_err("cut off");
+                let is_cut_off = matches!(error, PhotographError::CutOff { .. });
+                assert!(is_cut_off, "{format:?} {kept}: {error}");
+            }
+        }
+        let mut png = encoded(&busy(), ImageFormat::Png);
+        let middle = png.len() / 2;
+        png[middle] ^= 1;
+        let error = Photograph::read(&png).expect_err("damaged").to_string();
+        assert!(error.contains("the PNG cannot be decoded"), "{error}");
     }
 
     #[test]
@@ -279,7 +354,7 @@ mod tests {
         let heic = [&[0, 0, 0, 24][..], b"ftypheic", &[0; 12]].concat();
         for (bytes, expected) in [
             (b"no picture".to_vec(), "no picture"),
-            (whole[..whole.len() / 2].to_vec(), "no picture"),
+            (whole[..whole.len() / 2].to_vec(), "the PNG is cut off"),
             (b"GIF89a\x01\0\x01\0".to_vec(), "it is a GIF"),
             (b"RIFF\x20\0\0\0WEBPVP8 ".to_vec(), "it is a WebP"),
             (b"II*\0\x08\0\0\0".to_vec(), "it is a TIFF"),

@@ -446,6 +446,28 @@ fn what_is_not_seen_may_be_like_another_tree() {
 }
 
 #[test]
+fn a_jpeg_that_is_damaged_within_is_used_with_a_warning() {
+    let scene = Scene::new(photograph(true));
+    let mut jpeg = std::io::Cursor::new(Vec::new());
+    let sound = DynamicImage::from(photograph(true));
+    sound
+        .write_to(&mut jpeg, image::ImageFormat::Jpeg)
+        .expect("jpeg");
+    let mut jpeg = jpeg.into_inner();
+    // What stands below the foot of the tree.
+    let (from, to) = (jpeg.len() - 400, jpeg.len() - 2);
+    jpeg[from..to].fill(0);
+    fs::write(scene.path("hole.jpg"), &jpeg).expect("write");
+    let output = scene.photo("hole.jpg --crown crown.json --branch trunk.json", "tree");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{said}");
+    let warning = "arborcam: warning: hole.jpg: the JPEG is damaged";
+    assert!(said.lines().any(|l| l.starts_with(warning)), "{said}");
+    let tree = Document::read(&scene.path("tree"), 1.0).expect("a document");
+    assert!(tree.note.warnings.iter().any(|w| w.contains("damaged")));
+}
+
+#[test]
 fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
     let scene = Scene::new(photograph(true));
     DynamicImage::new_luma8(10_000, 10_000)
@@ -498,7 +520,11 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
     for (arguments, status, expected) in [
         (format!("none.png {strokes}"), NO_INPUT, "cannot read"),
         (format!("huge.png {strokes}"), FAILED, "100 megapixels"),
-        (format!("half.png {strokes}"), FAILED, "no picture"),
+        (
+            format!("half.png {strokes}"),
+            FAILED,
+            "half.png: it is damaged: the PNG is cut off",
+        ),
         (format!("crown.json {strokes}"), FAILED, "no picture"),
         (
             format!("sky.png {strokes}"),

@@ -39,9 +39,20 @@ pub struct ShownPicture {
     pub picture: Picture,
     /// As it is seen, before it was reduced.
     pub full_size: Size,
+    /// What of the file is damaged, of which the rest is used.
+    damage: Option<String>,
 }
 
 impl ShownPicture {
+    /// What is doubtful of the picture itself.
+    pub fn warning(&self) -> Option<String> {
+        let what = self.damage.as_ref()?;
+        Some(format!(
+            "the JPEG is damaged ({what}), and a part of the picture is wrong: look whether the tree is in it, or copy \
+             or export it anew"
+        ))
+    }
+
     /// By what places in the whole picture are to be multiplied.
     pub fn scale(&self) -> f64 {
         f64::from(self.picture.rgb.size.width) / f64::from(self.full_size.width)
@@ -85,6 +96,7 @@ impl PictureArgs {
                 time_s,
             },
             full_size: photo.full_size,
+            damage: photo.damage,
         }
     }
 
