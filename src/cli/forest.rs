@@ -6,6 +6,7 @@ use super::grow::tree_name;
 use super::output::eprint_line;
 use super::unused;
 use crate::document::MOST_GROUND_SAMPLES;
+use crate::export::gltf::NamedBytes;
 use crate::files::write_files;
 use crate::model::Size;
 use crate::views::{ForestOptions, ForestPlan, HeightMap, Parent};
@@ -132,17 +133,28 @@ pub fn write_forest(
     dir: &Path,
     is_stopped: &AtomicBool,
 ) -> Result<(), CommandError> {
-    let (trees, ground) = (forest.forest.trees.len(), forest.forest.ground.clone());
-    let templates = forest.origin.templates.len();
+    let told = told_of(&forest);
     let files = forest.files(dir)?;
     write_files(dir, &files, is_stopped)?;
-    let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
-    eprint_line(&format!(
-        "{}: a forest of {trees} trees of {templates} templates on {:.1} m x {:.1} m, {:.1} MB",
-        dir.display(),
+    let size_mb = megabytes(&files);
+    eprint_line(&format!("{}: {told}, {size_mb:.1} MB", dir.display()));
+    Ok(())
+}
+
+/// What is said of a forest.
+pub fn told_of(forest: &ForestPlan) -> String {
+    let ground = &forest.forest.ground;
+    format!(
+        "a forest of {} trees of {} templates on {:.1} m x {:.1} m",
+        forest.forest.trees.len(),
+        forest.origin.templates.len(),
         ground.width_m,
         ground.depth_m,
-        bytes as f64 / 1e6
-    ));
-    Ok(())
+    )
+}
+
+/// Size of files.
+pub fn megabytes(files: &[NamedBytes]) -> f64 {
+    let bytes: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+    bytes as f64 / 1e6
 }

@@ -8,17 +8,18 @@ mod picture;
 use super::command_error::CommandError;
 use super::common::parse_within;
 use super::example::Example;
-use super::forest::write_forest;
+use super::forest::{megabytes, told_of};
 use super::grow::tree_name;
 use super::output::eprint_line;
 use super::stop::Stop;
 use crate::cancel::CancelToken;
-use crate::files::refuse_taken;
+use crate::export::gltf::NamedBytes;
+use crate::files::{refuse_taken, write_folder};
 use crate::grow::SubtreeKind;
 use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 use crate::views::{
     Attracting, ForestPlan, PhotoDepth, PhotoExample, PhotoGrowth, PhotoParts, PhotoTree,
-    PhotoTreeError, StandingPlaces, photo_defaults, photo_forest,
+    PhotoTreeError, ReadyDocument, StandingPlaces, photo_defaults, photo_forest,
 };
 use crate::wood::LeafColour;
 use anyhow::anyhow;
@@ -27,7 +28,7 @@ use drawn::{DrawnTree, StrokeFiles};
 use nalgebra::Point2;
 use picture::{PictureArgs, ShownPicture};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 #[derive(Debug, Args)]
 pub struct PhotoArgs {
@@ -199,11 +200,10 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
         1 => None,
         _ => Some(args.forest(&shown, &trees)?),
     };
-    let is_stopped = stop.while_writing();
-    match forest {
-        None => write_single(&args.out, trees, is_stopped),
-        Some(forest) => write_all(&args.out, trees, forest, is_stopped),
-    }
+    let trees: Result<Vec<ReadyTree>, CommandError> =
+        trees.into_iter().map(ReadyTree::of).collect();
+    let folder = ReadyFolder::of(&args.out, trees?, forest)?;
+    folder.write(&args.out, stop.while_writing())
 }
 
 /// Parses a row of the photograph, px; the horizon may lie above the picture.
@@ -409,40 +409,73 @@ fn failure(shown: &ShownPicture, drawn: &DrawnTree, e: PhotoTreeError) -> Comman
     }
 }
 
-/// Writes one tree, and says of what it is made.
-fn write_tree(tree: PhotoTree, dir: &Path, is_stopped: &AtomicBool) -> Result<(), CommandError> {
-    let all = tree.tree.skeleton.measured_branches().count();
-    let grown = tree.growth.branches;
-    if is_stopped.load(Ordering::SeqCst) {
-        return Err(CommandError::Stopped);
-    }
-    tree.write(dir)?;
-    eprint_line(&format!(
-        "{}: a tree of {all} branches: {} seen, {grown} grown",
-        dir.display(),
-        all - grown.min(all)
-    ));
-    Ok(())
+/// A tree all of whose files are made, and of what it is made.
+struct ReadyTree {
+    document: ReadyDocument,
+    told: String,
 }
 
-fn write_single(
-    out: &Path,
-    trees: Vec<PhotoTree>,
-    is_stopped: &AtomicBool,
-) -> Result<(), CommandError> {
-    let mut trees = trees.into_iter();
-    trees.try_for_each(|tree| write_tree(tree, out, is_stopped))
+impl ReadyTree {
+    fn of(tree: PhotoTree) -> Result<Self, CommandError> {
+        let all = tree.tree.skeleton.measured_branches().count();
+        let grown = tree.growth.branches;
+        Ok(Self {
+            document: tree.ready()?,
+            told: format!(
+                "a tree of {all} branches: {} seen, {grown} grown",
+                all - grown.min(all)
+            ),
+        })
+    }
 }
 
-/// Writes several trees, each to a folder of its own, and their scene.
-fn write_all(
-    out: &Path,
-    trees: Vec<PhotoTree>,
-    forest: ForestPlan,
-    is_stopped: &AtomicBool,
-) -> Result<(), CommandError> {
-    for (number, tree) in (1..).zip(trees) {
-        write_tree(tree, &out.join(tree_name(number)), is_stopped)?;
+/// A folder all of whose files are made, and what is said of it once it is there.
+#[derive(Default)]
+struct ReadyFolder {
+    files: Vec<NamedBytes>,
+    lines: Vec<String>,
+}
+
+impl ReadyFolder {
+    /// One tree, which is the folder `out`; or several in folders of their own, and their scene.
+    fn of(
+        out: &Path,
+        trees: Vec<ReadyTree>,
+        forest: Option<ForestPlan>,
+    ) -> Result<Self, CommandError> {
+        let mut folder = Self::default();
+        let Some(forest) = forest else {
+            for tree in trees {
+                folder.lines.push(said_of(out, &tree.told));
+                folder.files.extend(tree.document.files);
+            }
+            return Ok(folder);
+        };
+        let mut templates = Vec::with_capacity(trees.len());
+        for (number, tree) in (1..).zip(trees) {
+            let name = tree_name(number);
+            folder.lines.push(said_of(&out.join(&name), &tree.told));
+            let files = tree.document.files.into_iter();
+            let files = files.map(|(file, bytes)| (format!("{name}/{file}"), bytes));
+            folder.files.extend(files);
+            templates.push(tree.document.tree);
+        }
+        let told = told_of(&forest);
+        let scene = forest.files_of(out, templates)?;
+        let told = format!("{told}, {:.1} MB", megabytes(&scene));
+        folder.lines.push(said_of(out, &told));
+        folder.files.extend(scene);
+        Ok(folder)
     }
-    write_forest(forest, out, is_stopped)
+
+    /// Writes it whole or not at all.
+    fn write(&self, out: &Path, is_stopped: &AtomicBool) -> Result<(), CommandError> {
+        write_folder(out, &self.files, is_stopped)?;
+        self.lines.iter().for_each(|line| eprint_line(line));
+        Ok(())
+    }
+}
+
+fn said_of(dir: &Path, told: &str) -> String {
+    format!("{}: {told}", dir.display())
 }

@@ -1,15 +1,13 @@
 //! Files that appear only when they are complete.
 
 use super::WriteError;
+use super::folder::write_pieces;
 use super::place::Place;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Bytes that are written between two looks at whether to go on.
-const PIECE: usize = 1 << 20;
+use std::sync::atomic::AtomicBool;
 
 /// Is written hidden beside the wanted place. Dropped without [`OutputFile::publish`], it leaves
 /// nothing behind.
@@ -95,13 +93,7 @@ impl OutputFile {
             .truncate(true)
             .custom_flags(libc::O_NOFOLLOW)
             .open(self.0.at())?;
-        for piece in bytes.chunks(PIECE) {
-            if stop.load(Ordering::SeqCst) {
-                return Ok(false);
-            }
-            file.write_all(piece)?;
-        }
-        Ok(true)
+        write_pieces(&mut file, bytes, stop)
     }
 
     /// Puts everything on the disk and gives the file its name.

@@ -12,7 +12,7 @@ mod replace;
 pub use bounded::read_bounded;
 pub use error::WriteError;
 pub use file::{OutputFile, write_files};
-pub use folder::OutputFolder;
+pub use folder::{OutputFolder, write_folder};
 pub use name::is_named_film;
 pub use place::refuse_taken;
 pub use replace::replace;

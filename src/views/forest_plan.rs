@@ -1,6 +1,6 @@
 //! Where the trees of a new forest will stand, before any of them is grown.
 
-use super::{Parent, PrepareError, PreparedForest};
+use super::{Parent, PrepareError, PreparedForest, PreparedTree};
 use crate::document::{ForestDocument, ForestOrigin};
 use crate::export::gltf::NamedBytes;
 use crate::grow::Planting;
@@ -104,8 +104,33 @@ impl ForestPlan {
     /// # Errors
     /// A template cannot be read, or the forest is none for a file.
     pub fn files(self, dir: &Path) -> Result<Vec<NamedBytes>, PrepareError> {
+        self.files_with(dir, PreparedForest::of)
+    }
+
+    /// The same of templates that are not written yet.
+    ///
+    /// # Errors
+    /// The forest is none for a file.
+    pub fn files_of(
+        self,
+        dir: &Path,
+        templates: Vec<PreparedTree>,
+    ) -> Result<Vec<NamedBytes>, PrepareError> {
+        self.files_with(dir, |document| {
+            Ok(PreparedForest {
+                document,
+                templates,
+            })
+        })
+    }
+
+    fn files_with(
+        self,
+        dir: &Path,
+        prepare: impl FnOnce(ForestDocument) -> Result<PreparedForest, PrepareError>,
+    ) -> Result<Vec<NamedBytes>, PrepareError> {
         let (document, own) = ForestDocument::as_written(dir, &self.forest, self.origin)?;
-        let mut files = PreparedForest::of(document)?.files()?;
+        let mut files = prepare(document)?.files()?;
         files.extend(own.into_iter().map(|f| (f.name.to_owned(), f.bytes)));
         Ok(files)
     }

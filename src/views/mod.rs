@@ -47,4 +47,6 @@ pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
 pub use sway_on_scan::{FilmedPoint, filmed_points, sway_on_scan};
 pub use tables::TablesWritten;
-pub use write::{DocumentWriter, Draft, SwayFound, put_notes, update, write_document};
+pub use write::{
+    DocumentWriter, Draft, ReadyDocument, SwayFound, put_notes, update, write_document,
+};

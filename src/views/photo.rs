@@ -1,7 +1,7 @@
 //! Documents of trees in one photograph (Tan et al. 2008).
 
 use super::drawn::DrawnTree;
-use super::{Draft, PrepareError, write_document};
+use super::{Draft, PrepareError, ReadyDocument};
 use crate::config::{Config, LeafShow};
 use crate::document::Document;
 use crate::document::note::{BarkNote, FoundNote, MasksNote, ModelNote, PictureNote};
@@ -12,7 +12,6 @@ use crate::model::{Outline, Picture, Skeleton, Swaying, Wood};
 use crate::pipeline::{PhotoError, TreeInPhoto};
 use crate::random::generator;
 use crate::shape::{self, Silhouette};
-use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Triangles of all leaves: a photograph shows single ones. With the 20,000 of a film the silhouette of
@@ -190,11 +189,11 @@ impl PhotoTree {
         nodes.map(|node| node.position.y).fold(0.0, f64::max)
     }
 
-    /// Writes it as a document to `dir`, which appears when it is complete.
+    /// Makes all files of its document.
     ///
     /// # Errors
-    /// `dir` is there already, or a file cannot be written.
-    pub fn write(self, dir: &Path) -> Result<PathBuf, PrepareError> {
+    /// The tree is none for a model's file, or cannot be read back.
+    pub fn ready(self) -> Result<ReadyDocument, PrepareError> {
         let draft = Draft {
             note: self.tree.note,
             skeleton: &self.tree.skeleton,
@@ -204,7 +203,7 @@ impl PhotoTree {
             poses: Vec::new(),
             pose_in_picture: None,
         };
-        write_document(dir, draft, &self.sway)
+        ReadyDocument::of(draft, &self.sway)
     }
 }
 

@@ -6,7 +6,7 @@ use crate::document::note::{CaptureNote, json};
 use crate::document::{
     BARK_FILE, Document, MODES_FILE, MOTION_FILE, MotionCsv, PICTURE_FILE, at_rest_files, jpeg, png,
 };
-use crate::export::gltf::glb;
+use crate::export::gltf::{NamedBytes, glb};
 use crate::files::{OutputFolder, WriteError, replace, write_files};
 use crate::model::{
     AtRest, FilmCut, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes,
@@ -49,6 +49,20 @@ pub struct SwayFound<'a> {
     /// `None` where the film is in one piece, or that is not known.
     pub cut: Option<FilmCut>,
 }
+
+impl<'a> SwayFound<'a> {
+    /// Of a tree that was not filmed.
+    fn at_rest(sway: &'a [Swaying]) -> Self {
+        Self {
+            sway,
+            modes: &[],
+            cut: None,
+        }
+    }
+}
+
+/// What takes a file of this name.
+type Put<'a> = dyn FnMut(&str, Vec<u8>) -> Result<(), WriteError> + 'a;
 
 /// A document on its way to the disk.
 ///
@@ -102,35 +116,73 @@ impl DocumentWriter {
         warnings: Vec<String>,
         judgement: Option<Judgement>,
     ) -> Result<(), PrepareError> {
+        let put = &mut |name: &str, bytes: Vec<u8>| folder.write(name, &bytes);
+        self.each_file(found, warnings, judgement, put)
+    }
+
+    /// Makes one file after the other, and gives each to `put`.
+    fn each_file(
+        &mut self,
+        found: SwayFound,
+        warnings: Vec<String>,
+        judgement: Option<Judgement>,
+        put: &mut Put,
+    ) -> Result<(), PrepareError> {
         self.tree.take_sway(found)?;
         let document = &self.tree.document;
-        folder.write("nodes.csv", &document.nodes_csv()?)?;
+        put("nodes.csv", document.nodes_csv()?)?;
         if document.note.timing.is_of_film() {
-            folder.write(MODES_FILE, &document.modes_csv()?)?;
+            put(MODES_FILE, document.modes_csv()?)?;
         }
         let (model, animation) = glb(&self.tree.model())?;
-        folder.write(MODEL_FILE, &model)?;
-        if let Some(bytes) = &self.picture_jpg {
-            folder.write(PICTURE_FILE, bytes)?;
+        put(MODEL_FILE, model)?;
+        if let Some(bytes) = self.picture_jpg.take() {
+            put(PICTURE_FILE, bytes)?;
         }
         if let Some(bark) = &self.tree.document.bark {
-            folder.write(BARK_FILE, &png(bark)?)?;
+            put(BARK_FILE, png(bark)?)?;
         }
         if let Some(at_rest) = &self.at_rest {
             for file in at_rest_files(at_rest)? {
-                folder.write(file.name, &file.bytes)?;
+                put(file.name, file.bytes)?;
             }
         }
-        let mut note = CaptureNote {
-            animation: Some(animation),
-            warnings,
-            ..self.tree.document.note
-        };
+        let note = &mut self.tree.document.note;
+        note.animation = Some(animation);
+        note.warnings = warnings;
         if let Some(judgement) = judgement {
             note.take_judgement(judgement);
         }
-        folder.write(NOTE_FILE, &json(&note)?)?;
+        put(NOTE_FILE, json(note)?)?;
         Ok(())
+    }
+}
+
+/// A document all of whose files are made, before the first is written: until then a signal may end the
+/// program at once.
+pub struct ReadyDocument {
+    pub tree: PreparedTree,
+    pub files: Vec<NamedBytes>,
+}
+
+impl ReadyDocument {
+    /// Makes the files of a tree at rest.
+    ///
+    /// # Errors
+    /// The tree is none for a model's file, or cannot be read back.
+    pub fn of(draft: Draft, sway: &[Swaying]) -> Result<Self, PrepareError> {
+        let warnings = draft.note.warnings.clone();
+        let mut writer = DocumentWriter::new(draft)?;
+        let mut files = Vec::new();
+        let put = &mut |name: &str, bytes: Vec<u8>| {
+            files.push((name.to_owned(), bytes));
+            Ok(())
+        };
+        writer.each_file(SwayFound::at_rest(sway), warnings, None, put)?;
+        Ok(Self {
+            tree: writer.tree,
+            files,
+        })
     }
 }
 
@@ -142,12 +194,8 @@ impl DocumentWriter {
 pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
     let folder = OutputFolder::create(dir)?;
     let warnings = draft.note.warnings.clone();
-    let found = SwayFound {
-        sway,
-        modes: &[],
-        cut: None,
-    };
     write_motion(&folder, &draft)?;
+    let found = SwayFound::at_rest(sway);
     DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
     Ok(folder.publish()?)
 }

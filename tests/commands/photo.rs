@@ -7,12 +7,14 @@ use arborcam::signal::distance_to_segment;
 use image::{DynamicImage, Rgb, RgbImage};
 use nalgebra::Point2;
 use std::fs;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 const FAILED: i32 = 1;
 const BAD_USAGE: i32 = 2;
 const NO_INPUT: i32 = 3;
+const STOPPED: i32 = 130;
 const WIDTH: u32 = 480;
 const HEIGHT: u32 = 360;
 const FOOT: [f64; 2] = [240.0, 330.0];
@@ -78,12 +80,17 @@ impl Scene {
         fs::write(self.path(name), text).expect("write");
     }
 
-    /// Runs the command; names of files are those in the folder.
-    fn photo(&self, arguments: &str, out: &str) -> Output {
+    /// The command; names of files are those in the folder.
+    fn command(&self, arguments: &str, out: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
         command.current_dir(self.dir.path()).arg("photo");
         command.args(arguments.split(' ')).args(["--out", out]);
-        command.output().expect("arborcam")
+        command
+    }
+
+    /// Runs it.
+    fn photo(&self, arguments: &str, out: &str) -> Output {
+        self.command(arguments, out).output().expect("arborcam")
     }
 
     /// The tree of the photograph and its strokes with further options, and what was said.
@@ -465,6 +472,36 @@ fn a_jpeg_that_is_damaged_within_is_used_with_a_warning() {
     assert!(said.lines().any(|l| l.starts_with(warning)), "{said}");
     let tree = Document::read(&scene.path("tree"), 1.0).expect("a document");
     assert!(tree.note.warnings.iter().any(|w| w.contains("damaged")));
+}
+
+/// Ctrl-C as soon as there is anything of the tree on the disk.
+#[test]
+fn a_signal_ends_it_in_its_second_half_too_and_leaves_nothing() {
+    let scene = Scene::new(photograph(true));
+    let before = names_in(scene.dir.path());
+    let mut stopped = 0;
+    for _ in 0..5 {
+        let mut command = scene.command("photo.png --crown crown.json --branch trunk.json", "tree");
+        let mut child = command.stderr(Stdio::null()).spawn().expect("arborcam");
+        let mut ended = None;
+        while ended.is_none() && names_in(scene.dir.path()) == before {
+            ended = child.try_wait().expect("status");
+        }
+        if ended.is_none() {
+            // SAFETY: the child is ours and not yet waited for.
+            unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
+        }
+        let status = child.wait().expect("status");
+        if status.success() {
+            // It was there already.
+            fs::remove_dir_all(scene.path("tree")).expect("a whole tree");
+            continue;
+        }
+        assert_eq!((status.code(), status.signal()), (Some(STOPPED), None));
+        assert_eq!(names_in(scene.dir.path()), before);
+        stopped += 1;
+    }
+    assert!(stopped > 0);
 }
 
 #[test]
