@@ -522,6 +522,8 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
     let jpeg = jpeg.into_inner();
     fs::write(scene.path("cut.jpg"), &jpeg[..2 * jpeg.len() / 3]).expect("write");
     scene.write("one.json", &sketch(0.0));
+    scene.write("copy.json", &sketch(0.25));
+    scene.write("beside.json", &sketch(2.0));
     let line = |text: &str| format!(r#"{{"width": 480, "height": 360, "polyline_px": {text}}}"#);
     let crown = |text: &str| format!(r#"{{"width": 480, "height": 360, "polygon_px": {text}}}"#);
     scene.write("off.json", &line("[[240, 330], [240, 900]]"));
@@ -659,9 +661,19 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
             "trunk.json: each of several trees",
         ),
         (
-            "photo.png --tree one.json --tree one.json --horizon 350".into(),
+            "photo.png --tree one.json --tree beside.json --horizon 350".into(),
             BAD_USAGE,
             "--horizon",
+        ),
+        (
+            "photo.png --tree one.json --tree one.json".into(),
+            BAD_USAGE,
+            "one.json: it is the tree of --tree one.json once more",
+        ),
+        (
+            "photo.png --tree one.json --tree copy.json".into(),
+            BAD_USAGE,
+            "copy.json: it is the tree of --tree one.json once more",
         ),
         (
             "photo.png --tree one.json --tree off.json".into(),

@@ -9,10 +9,13 @@ use crate::model::{TreeStrokes, scaled};
 use crate::pipeline::{DrawnPart, PhotoError};
 use anyhow::anyhow;
 use clap::Args;
+use nalgebra::Point2;
 use std::path::Path;
 
 /// Largest file of strokes that is read, bytes.
 const LARGEST: u64 = 64_000_000;
+/// Trees whose feet are nearer to each other than this are one, px: no two trunks stand on each other.
+const SAME_FOOT_PX: f64 = 1.0;
 
 #[derive(Debug, Args)]
 pub struct StrokeFiles {
@@ -55,6 +58,20 @@ pub struct DrawnTree {
 }
 
 impl DrawnTree {
+    /// The lower end of its trunk's stroke; `None` where none is drawn.
+    fn foot_px(&self) -> Option<Point2<f64>> {
+        let [first, .., last] = self.strokes.branches_px.first()?.as_slice() else {
+            return None;
+        };
+        Some(if first.y < last.y { *last } else { *first })
+    }
+
+    /// Whether it stands where another one does.
+    fn stands_on(&self, other: &Self) -> bool {
+        let feet_px = self.foot_px().zip(other.foot_px());
+        feet_px.is_some_and(|(a, b)| (a - b).norm() < SAME_FOOT_PX)
+    }
+
     /// The file with what an error is about; `None` if that is the photograph.
     pub fn file_of(&self, e: &PhotoError) -> Option<&String> {
         match e.at_fault()? {
@@ -107,12 +124,12 @@ impl StrokeFiles {
     /// What is drawn on a photograph: one tree at least, though maybe without a stroke.
     ///
     /// # Errors
-    /// A file is for another picture, or of several trees one has no crown or no stroke.
+    /// A file is for another picture, or of several trees one has no crown or no stroke, or two are the same.
     pub fn on(&self, shown: &ShownPicture) -> Result<Vec<DrawnTree>, CommandError> {
         if self.trees.is_empty() {
             return Ok(vec![self.single(shown)?]);
         }
-        let mut trees = Vec::with_capacity(self.trees.len());
+        let mut trees: Vec<DrawnTree> = Vec::with_capacity(self.trees.len());
         for file in &self.trees {
             let strokes = TreeStrokes {
                 crown_px: file.sketch.crown_px.clone(),
@@ -125,11 +142,20 @@ impl StrokeFiles {
                     file.name
                 )));
             }
-            trees.push(DrawnTree {
+            let tree = DrawnTree {
                 crown_file: Some(file.name.clone()),
                 branch_files: vec![file.name.clone(); strokes.branches_px.len()],
                 strokes: strokes.scaled(file.scale("--tree", shown)?),
-            });
+            };
+            if let Some(number) = trees.iter().position(|other| tree.stands_on(other)) {
+                return Err(CommandError::BadUsage(anyhow!(
+                    "--tree {}: it is the tree of --tree {} once more, for both trunks have one foot; give each \
+                     tree once",
+                    file.name,
+                    self.trees[number].name
+                )));
+            }
+            trees.push(tree);
         }
         Ok(trees)
     }
