@@ -4,6 +4,8 @@
 mod sheet;
 mod shown;
 
+#[cfg(test)]
+pub(super) use sheet::KEYS;
 pub(super) use sheet::{Next, Sheet};
 
 use super::opened::Opened;

@@ -1,5 +1,6 @@
 //! The help, laid over everything else.
 
+use crate::tui::format::wrap;
 use crate::tui::input::{Binding, DRAWING, WATCHING};
 use crate::tui::layout::SMALLEST;
 use crate::tui::state::State;
@@ -22,33 +23,48 @@ const MEANINGS: [(&str, &str); 3] = [
     ("▲", "the answer in the spectrum of its angle, for the eye"),
 ];
 
+/// Columns of the panel at most, of its frame with the gaps beside it, and of the keys.
+const WIDEST: u16 = 74;
+const FRAME_WIDTH: u16 = 4;
+const KEY_WIDTH: usize = 10;
+
+/// A line of the help.
+enum Row {
+    Head(&'static str),
+    Key(&'static str, &'static str),
+}
+
 /// All keys of the capture, from the same tables that they are read with.
 pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
-    let mut lines = rows(&WATCHING, theme);
-    lines.push(Line::styled("What is shown of a branch", theme.faint()));
-    lines.extend(MEANINGS.map(|(shown, help)| row(shown, help, theme)));
-    panel(frame, lines, state, area, theme);
+    let mut rows = explained(&WATCHING);
+    rows.push(Row::Head("What is shown of a branch"));
+    rows.extend(MEANINGS.map(|(shown, help)| Row::Key(shown, help)));
+    panel(frame, rows, state, area, theme);
 }
 
 /// All keys of the screen on which a user draws on a photograph.
 pub fn of_photograph<A>(frame: &mut Frame, keys: &[Binding<A>], state: &State, theme: Theme) {
-    panel(frame, rows(keys, theme), state, frame.area(), theme);
+    panel(frame, explained(keys), state, frame.area(), theme);
 }
 
-/// These lines and the keys while something is drawn.
-fn panel<'a>(frame: &mut Frame, mut lines: Vec<Line<'a>>, state: &State, area: Rect, theme: Theme) {
+/// These rows and the keys while something is drawn.
+fn panel(frame: &mut Frame, rows: Vec<Row>, state: &State, area: Rect, theme: Theme) {
     let mut drawing = vec![
-        Line::styled("While an outline or a line is drawn", theme.faint()),
-        row("click", "sets a point", theme),
+        Row::Head("While an outline or a line is drawn"),
+        Row::Key("click", "sets a point"),
     ];
-    drawing.extend(rows(&DRAWING, theme));
+    drawing.extend(explained(&DRAWING));
+    let width = WIDEST.min(area.width);
+    let most = area.height.saturating_sub(2) as usize;
+    let mut lines = lines_of(&rows, width, most, theme);
+    let mut drawing = lines_of(&drawing, width, most, theme);
     // Where there is no room for both, those that mean something now.
-    if lines.len() + drawing.len() + 2 <= area.height as usize {
+    if lines.len() + drawing.len() <= most {
         lines.append(&mut drawing);
     } else if state.drawing.is_some() {
         lines = drawing;
     }
-    let (width, height) = (74, lines.len() as u16 + 2);
+    let height = lines.len() as u16 + 2;
     let area = area.centered(Constraint::Length(width), Constraint::Length(height));
     let block = Block::bordered()
         .title(" Keys ")
@@ -60,16 +76,37 @@ fn panel<'a>(frame: &mut Frame, mut lines: Vec<Line<'a>>, state: &State, area: R
 }
 
 /// The keys that have an explanation.
-fn rows<A>(keys: &[Binding<A>], theme: Theme) -> Vec<Line<'static>> {
+fn explained<A>(keys: &[Binding<A>]) -> Vec<Row> {
     let explained = keys.iter().filter(|b| !b.help.is_empty());
-    explained.map(|b| row(b.shown, b.help, theme)).collect()
+    explained.map(|b| Row::Key(b.shown, b.help)).collect()
 }
 
-fn row(key: &'static str, help: &'static str, theme: Theme) -> Line<'static> {
-    Line::from(vec![
-        Span::styled(format!("{key:<10}"), theme.title()),
-        Span::raw(help),
-    ])
+/// The rows in a panel so wide: whole if that takes `most` lines, else each in one line, which may be cut.
+fn lines_of(rows: &[Row], width: u16, most: usize, theme: Theme) -> Vec<Line<'static>> {
+    let room = width.saturating_sub(FRAME_WIDTH) as usize;
+    let whole: Vec<Line> = rows.iter().flat_map(|row| row.lines(room, theme)).collect();
+    if whole.len() <= most {
+        return whole;
+    }
+    let cut = rows.iter().flat_map(|row| row.lines(usize::MAX, theme));
+    cut.collect()
+}
+
+impl Row {
+    /// As lines of at most so many columns.
+    fn lines(&self, room: usize, theme: Theme) -> Vec<Line<'static>> {
+        let (key, help) = match *self {
+            Self::Head(text) => return vec![Line::styled(text, theme.faint())],
+            Self::Key(key, help) => (key, help),
+        };
+        let keys = std::iter::once(key).chain(std::iter::repeat(""));
+        let texts = wrap(help, room.saturating_sub(KEY_WIDTH));
+        let lines = keys.zip(texts).map(|(key, text)| {
+            let key = Span::styled(format!("{key:<KEY_WIDTH$}"), theme.title());
+            Line::from(vec![key, Span::raw(text)])
+        });
+        lines.collect()
+    }
 }
 
 /// What is said in a window in which nothing can be shown. While the user draws, `q` waits.
@@ -77,7 +114,7 @@ pub fn too_small(frame: &mut Frame, area: Rect) {
     let (width, height) = SMALLEST;
     let text =
         format!("arborcam needs {width}x{height} characters; enlarge the window. Ctrl-C ends.");
-    let lines: Vec<Line> = crate::tui::format::wrap(&text, area.width as usize)
+    let lines: Vec<Line> = wrap(&text, area.width as usize)
         .into_iter()
         .map(Line::from)
         .collect();

@@ -18,7 +18,7 @@ const MOST_UNDONE: usize = 20;
 
 /// What a key does while nothing is being drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Action {
+pub(in crate::tui) enum Action {
     Help,
     Accept,
     Draw(Subject),
@@ -30,7 +30,7 @@ pub(super) enum Action {
     Quit,
 }
 
-pub(super) const KEYS: [Binding<Action>; 10] = [
+pub(in crate::tui) const KEYS: [Binding<Action>; 10] = [
     bind(
         KeyCode::Char('c'),
         "c",
@@ -42,7 +42,7 @@ pub(super) const KEYS: [Binding<Action>; 10] = [
         KeyCode::Char('b'),
         "b",
         "branch",
-        "draws a branch from its base to its tip, the trunk first",
+        "draws a branch from base to tip, the trunk first",
         Action::Draw(Subject::Branch),
     ),
     bind(
@@ -63,7 +63,7 @@ pub(super) const KEYS: [Binding<Action>; 10] = [
         KeyCode::Char('w'),
         "w",
         "found",
-        "shows the picture without what was found, or with it",
+        "shows or hides what was found",
         Action::Found,
     ),
     bind(

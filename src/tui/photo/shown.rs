@@ -2,11 +2,12 @@
 
 use super::sheet::{KEYS, Sheet};
 use crate::model::{BranchGraph, Masks, Rgb, Snapshot, Wood, WoodNode};
+use crate::tui::format::keep_begin;
 use crate::tui::panels::preview::{self, Preview};
 use crate::tui::panels::{help, messages};
 use crate::tui::theme::Theme;
 use ratatui::Frame;
-use ratatui::layout::{Constraint, Layout};
+use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::text::Line;
 use std::sync::Arc;
 
@@ -51,48 +52,73 @@ impl Sheet {
     }
 
     pub fn render(&self, frame: &mut Frame, theme: Theme, picture: &mut Preview) {
+        let window = frame.area();
+        let standing = self.standing();
+        let newest = self.state.messages().last().unwrap_or(&standing);
+        let named = || {
+            let named = KEYS.iter().filter(|b| !b.short.is_empty());
+            named.map(|b| (b.shown, b.short))
+        };
+        let key_rows = messages::key_rows(named(), window.width).len() as u16;
         let [line, sheet, message, keys] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Fill(1),
-            Constraint::Length(1),
-            Constraint::Length(1),
+            Constraint::Length(message_rows(newest, window)),
+            Constraint::Length(key_rows.min(window.height / 5).max(1)),
         ])
-        .areas(frame.area());
+        .areas(window);
         let number = self.trees.len();
         let strokes = self.trees.last().map(|tree| &tree.strokes);
         let crown = strokes.is_some_and(|s| !s.crown_px.is_empty());
         let branches = strokes.map_or(0, |s| s.branches_px.len());
         let crown = if crown { "a crown" } else { "no crown" };
         let plural = if branches == 1 { "" } else { "es" };
+        // The name comes last, as it may be cut.
         let title = format!(
-            " arborcam photo  {}  tree {number}: {crown}, {branches} branch{plural} drawn",
+            " arborcam  tree {number}: {crown}, {branches} branch{plural} drawn  {}",
             self.name
         );
+        let title = keep_begin(&title, window.width as usize);
         frame.render_widget(Line::styled(title, theme.strong()), line);
         preview::render(frame, &self.state, sheet, theme, picture);
         match (self.looking, self.state.messages().next()) {
             (_, Some(_)) => messages::render(frame, &self.state, message, theme),
-            (Some(looking), None) => {
-                let since_s = looking.began.elapsed().as_secs_f64();
-                let told = format!(" · Looking… {since_s:.1} s (keys work meanwhile)");
-                frame.render_widget(Line::styled(told, theme.strong()), message);
-            }
-            (None, None) => {
-                let told = Line::styled(format!(" · {}", self.told()), theme.faint());
-                frame.render_widget(told, message);
-            }
+            (Some(_), None) => messages::standing(frame, &standing, message, theme.strong()),
+            (None, None) => messages::standing(frame, &standing, message, theme.faint()),
         }
         match self.state.drawing {
             Some(_) => messages::keys(frame, &self.state, keys, theme),
-            None => {
-                let named = KEYS.iter().filter(|b| !b.short.is_empty());
-                messages::key_line(frame, named.map(|b| (b.shown, b.short)), keys, theme);
-            }
+            None => messages::key_line(frame, named(), keys, theme),
         }
         if self.state.help {
             help::of_photograph(frame, &KEYS, &self.state, theme);
         }
     }
+}
+
+impl Sheet {
+    /// What is so while there is no message.
+    fn standing(&self) -> String {
+        match self.looking {
+            Some(looking) => {
+                let since_s = looking.began.elapsed().as_secs_f64();
+                format!("Looking… {since_s:.1} s (keys work meanwhile)")
+            }
+            None => self.told(),
+        }
+    }
+}
+
+/// Rows for what is said: as many as most of it takes, so that the picture seldom changes its size, and for what
+/// is longer as many as it takes, up to a share of the window.
+fn message_rows(text: &str, window: Rect) -> u16 {
+    let usual = match window.width {
+        0..80 => 3,
+        80..160 => 2,
+        160.. => 1,
+    };
+    let rows = messages::rows(text, window.width).max(usual);
+    rows.min(window.height / 4).max(1)
 }
 
 /// Adds the branches of another tree.

@@ -2,8 +2,9 @@
 
 use crate::model::{AtRest, BranchGraph, Rgb, Size, TreeStrokes, Wood, WoodNode};
 use crate::tui::graphics::Graphics;
+use crate::tui::input::DRAWING;
 use crate::tui::panels::preview::Preview;
-use crate::tui::photo::{FoundTree, Next, PhotoSession, Sheet};
+use crate::tui::photo::{FoundTree, KEYS, Next, PhotoSession, Sheet};
 use crate::tui::theme::{Depth, Theme};
 use nalgebra::Point2;
 use ratatui::Terminal;
@@ -320,6 +321,51 @@ fn the_screen_leaves_by_its_keys_and_draws_in_any_window() {
         assert_eq!(screen.press(KeyCode::Char('q')), Next::Quit);
         let with_control = KeyEvent::new(KeyCode::Char('c'), KeyModifiers::CONTROL);
         assert_eq!(screen.event(&Event::Key(with_control)), Next::Quit);
+    }
+}
+
+/// What is shown, without its lines and frames.
+fn words(screen: &Screen) -> String {
+    let shown = screen.shown().replace(['│', '"'], " ");
+    let words: Vec<&str> = shown.split_whitespace().collect();
+    words.join(" ")
+}
+
+#[test]
+fn in_narrow_windows_what_is_said_and_the_keys_are_whole() {
+    for (width, height) in [(60, 20), (80, 24)] {
+        let mut screen = Screen::new(width, height);
+        screen.puppet.certainty = Some(0.42);
+        screen.stroke('c', &CROWN);
+        screen.stroke('b', &TRUNK);
+        let expect = |screen: &Screen, expected: &str| {
+            let shown = words(screen);
+            assert!(shown.contains(expected), "{expected}: {}", screen.shown());
+        };
+        expect(&screen, "tree 1: a crown, 1 branch drawn oak.jpg");
+        for key in ["Enter accept", "q quit", "? help"] {
+            expect(&screen, key);
+        }
+        let told = "bare, wood with 2 tips; found without strokes, right with a chance of 42 %";
+        expect(&screen, told);
+        screen.sheet.state.unsay();
+        screen.draw();
+        expect(&screen, told);
+        screen.press(KeyCode::Enter);
+        expect(&screen, "Enter once more makes the tree all the same");
+        screen.press(KeyCode::Char('?'));
+        for help in KEYS.iter().map(|b| b.help) {
+            expect(&screen, help);
+        }
+        screen.press(KeyCode::Char('?'));
+        screen.press(KeyCode::Char('b'));
+        for key in ["click set", "Enter done", "arrows move"] {
+            expect(&screen, key);
+        }
+        screen.press(KeyCode::Char('?'));
+        for help in DRAWING.iter().map(|b| b.help) {
+            expect(&screen, help);
+        }
     }
 }
 
