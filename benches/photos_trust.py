@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What `arborcam photo` does with bad strokes, with strokes drawn half a pixel beside, and how right it is without any.
 
-  photos_trust.py ARBORCAM WORK_DIR bad|beside|none SEED... [--json FILE]
+  photos_trust.py ARBORCAM WORK_DIR bad|beside|none|crown|branch SEED... [--json FILE]
 
 Each seed is a made photograph as of photos.py, with its crown stroke and its trunk stroke.
 
@@ -22,7 +22,9 @@ none     no stroke, of the whole photograph and of five parts of it, in which th
          certainty, and whether the tree is right. It is if 0.8 of the traced length lies on the true tree (6 px), the foot is
          within 5 % of the tree's height, and in leaf the leaves meet the true ones by 0.6, or 0.4 of the true wood is
          covered of a bare one
-fit      JSON files of `none` in place of seeds: the weights of src/pipeline/certainty.rs. They are to be of a build whose
+crown    the same with the crown's stroke alone, as far as it lies in the part
+branch   the same with the trunk's stroke alone, of the parts that hold it
+fit      JSON files of these three in place of seeds: the weights of src/pipeline/certainty.rs. They are to be of a build whose
          LEAST_CHANCE is 0, which makes doubtful trees, too
 
 Needs numpy, scipy and opencv-python-headless.
@@ -47,7 +49,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("arborcam")
     parser.add_argument("work_dir", type=Path)
-    parser.add_argument("what", choices=["bad", "beside", "none", "fit"])
+    parser.add_argument("what", choices=["bad", "beside", "none", "crown", "branch", "fit"])
     parser.add_argument("seeds", nargs="+")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
@@ -56,10 +58,10 @@ def main():
     rows = []
     for seed in map(int, args.seeds):
         photo = Photo(args, seed)
-        for row in {"bad": bad, "beside": beside, "none": none}[args.what](photo):
+        for row in {"bad": bad, "beside": beside, "none": none, "crown": crown, "branch": branch}[args.what](photo):
             rows.append(dict(seed=seed, bare=seed % 2 == 1) | row)
             print(rows[-1], flush=True)
-    {"bad": sum_bad, "beside": sum_beside, "none": sum_none}[args.what](rows)
+    {"bad": sum_bad, "beside": sum_beside}.get(args.what, sum_none)(rows)
     if args.json:
         args.json.write_text(json.dumps(rows))
 
@@ -198,6 +200,30 @@ def sum_beside(rows):
 
 
 def none(photo):
+    return found(photo, lambda photo, part: [])
+
+
+def crown(photo):
+    return found(photo, lambda photo, part: given(photo, "crown", "polygon_px", part))
+
+
+def branch(photo):
+    return found(photo, lambda photo, part: given(photo, "branch", "polyline_px", part))
+
+
+def given(photo, option, key, part):
+    """The option with a stroke as it lies in a part; None if it does not."""
+    left, top, right, bottom = part
+    size, line = (right - left, bottom - top), np.array((photo.crown if option == "crown" else photo.trunk)[key], float) - (left, top)
+    inside = line.clip(0, np.array(size) - 1)
+    if option == "branch" and (inside != line).any():
+        return None
+    path = photo.work / "trust-part.json"
+    path.write_text(json.dumps({"width": int(size[0]), "height": int(size[1]), key: inside.tolist()}))
+    return [f"--{option}", path]
+
+
+def found(photo, strokes):
     image = cv2.imread(str(photo.folder / "photo.jpg"))
     width, height = photo.size()
     foot = np.array(photo.trunk["polyline_px"][0], float)
@@ -205,7 +231,10 @@ def none(photo):
         left, top, right, bottom = np.round(np.array(part) * (width, height, width, height)).astype(int)
         path = photo.work / "trust-part.png"
         cv2.imwrite(str(path), image[top:bottom, left:right])
-        out, said = photo.run(picture=path)
+        options = strokes(photo, (left, top, right, bottom))
+        if options is None:
+            continue
+        out, said = photo.run(*options, picture=path)
         percent = re.search(r"chance of (\d+) %", said[1])
         row = dict(part=PARTS.index(part), made=out is not None, says=int(percent[1]) / 100 if percent else None)
         if out:
