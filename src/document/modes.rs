@@ -149,6 +149,7 @@ impl ModeCells<'_> {
             sway: self.sway()?,
             collinearity: self.collinearity()?,
             node,
+            is_trunks: false,
             points,
             motion_px2: self.motion_px2(skeleton)?,
         })
@@ -231,6 +232,7 @@ mod tests {
             },
             collinearity: Some(0.97),
             node: Some(NodeId(2)),
+            is_trunks: false,
             points: 9,
             motion_px2: vec![0.0, 25.0, 75.0, 0.0],
         };

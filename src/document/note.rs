@@ -492,7 +492,7 @@ impl CaptureNote {
     ) -> Option<Judgement> {
         let facts = self.judged_by.clone()?;
         let facts = CaptureFacts {
-            sway: SwayFacts::of(skeleton, sway, modes.iter().map(|mode| mode.sway)),
+            sway: SwayFacts::of(skeleton, sway, modes.iter().map(Into::into)),
             ..facts
         };
         Some(Judgement::of(facts.with_cut(cut)))

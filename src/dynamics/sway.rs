@@ -91,7 +91,7 @@ pub fn analyse(
     } = &usable;
     withdraw_small(&tree, film, members, *trunk, &mut sways, found.as_ref());
     Analysis {
-        modes: modes_of_tree(&tree, film, members, &sways, found.as_ref()),
+        modes: modes_of_tree(&tree, film, members, *trunk, &sways, found.as_ref()),
         sway: tree.by_node(&sways),
         onset: Some(usable.onset),
         releases_s: usable.releases_s,

@@ -32,11 +32,12 @@ pub(super) fn modes_of_tree(
     tree: &BranchTree,
     film: &Film,
     members: &[Vec<usize>],
+    trunk: NodeId,
     sways: &[Swaying],
     found: Option<&PointModes>,
 ) -> Vec<TreeMode> {
     let swings = swings(tree, members, sways, found);
-    let mut out: Vec<TreeMode> = swings.iter().map(|s| s.mode(tree, film)).collect();
+    let mut out: Vec<TreeMode> = swings.iter().map(|s| s.mode(tree, film, trunk)).collect();
     out.sort_by(|a, b| {
         let [a, b] = [a, b].map(|mode| mode.sway.frequency_hz.value);
         a.total_cmp(&b)
@@ -152,7 +153,7 @@ impl Swing<'_> {
         by_track
     }
 
-    fn mode(&self, tree: &BranchTree, film: &Film) -> TreeMode {
+    fn mode(&self, tree: &BranchTree, film: &Film, trunk: NodeId) -> TreeMode {
         let by_track = self.motion_px2(film);
         let mut by_branch = vec![0.0; tree.len()];
         for &k in self.tracks {
@@ -162,6 +163,7 @@ impl Swing<'_> {
             sway: self.sway,
             collinearity: self.collinearity,
             node: self.branch.map(|b| tree.branches[b].node),
+            is_trunks: self.branch == Some(trunk.index()),
             points: self.tracks.len(),
             motion_px2: tree.values_by_node(&by_branch, 0.0),
         }

@@ -228,10 +228,10 @@ impl InWind<'_> {
         let by_modes = ambient::fundamental(self.film, &points, &frames, within_hz, self.cancel);
         let by_modes = by_modes.filter(|o| !o.at_limit);
         let by_turn = self.by_turn_of_trunk(&points, &frames);
-        // Where they contradict each other the turn is right more often (docs/design/sway.md).
-        let found = by_turn.as_ref().or(by_modes.as_ref())?;
+        let found = slower_where_apart(by_turn.as_ref(), by_modes.as_ref())?;
         let mut mode = OWN_POINTS.mode_of(found.mode, &found.ln_sd);
-        if let Some(other) = &by_modes {
+        // With itself it agrees as it is.
+        for other in [&by_turn, &by_modes].into_iter().flatten() {
             mode = mode.agreed_with(&OWN_POINTS.mode_of(other.mode, &other.ln_sd));
         }
         if !self.limits.may_be_trunks(&mode, self.film) {
@@ -464,6 +464,22 @@ fn check_one_swing(
         return Err(Unidentified::NoOscillation);
     }
     Ok(())
+}
+
+/// Of the trunk's two answers that from its turn where they may be one, else the slower: the whole tree
+/// sways slowest, and what takes it and a limb near it for one oscillation is too fast
+/// (docs/design/sway.md).
+fn slower_where_apart<'a>(
+    by_turn: Option<&'a Oscillator>,
+    by_modes: Option<&'a Oscillator>,
+) -> Option<&'a Oscillator> {
+    let (Some(turn), Some(modes)) = (by_turn, by_modes) else {
+        return by_turn.or(by_modes);
+    };
+    let [of_turn, of_modes] = [turn, modes].map(|o| OWN_POINTS.mode_of(o.mode, &o.ln_sd));
+    let modes_answer =
+        !of_turn.agrees_with(&of_modes) && modes.mode.frequency_hz < turn.mode.frequency_hz;
+    Some(if modes_answer { modes } else { turn })
 }
 
 /// Root of the mean square displacement of a point.

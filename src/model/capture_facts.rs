@@ -1,7 +1,7 @@
 //! What is known of a capture when it is judged, and what of it is not as it should be.
 
 use super::verdict::{Finding, Grade};
-use super::{Excitation, FootBasis, NodeId, Skeleton, Sway, Swaying, Unidentified};
+use super::{Excitation, FootBasis, ModeSummary, Skeleton, Sway, Swaying, TreeMode, Unidentified};
 use serde::{Deserialize, Serialize};
 
 /// The sway of a branch is identified well from so many of its periods: in wind, the 95 % interval of a
@@ -20,9 +20,6 @@ const LONGEST_S: f64 = 60.0;
 const POOR_SHARE: f64 = 0.4;
 /// Half a second is not missed.
 const LENGTH_SLACK_S: f64 = 0.5;
-
-/// Level of the trunk.
-const TRUNK_LEVEL: u8 = 1;
 
 /// Below this amplitude, px, motion is that of the noise of tracking (0.03 to 0.1 px) as much as of
 /// the tree.
@@ -146,23 +143,49 @@ impl Shake {
     }
 }
 
+/// A mode of the whole tree, as far as a verdict asks for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownMode {
+    pub sway: Sway,
+    /// Whether it is the trunk's own.
+    pub is_trunks: bool,
+}
+
+impl From<&TreeMode> for KnownMode {
+    fn from(mode: &TreeMode) -> Self {
+        Self {
+            sway: mode.sway,
+            is_trunks: mode.is_trunks,
+        }
+    }
+}
+
+impl From<&ModeSummary> for KnownMode {
+    fn from(mode: &ModeSummary) -> Self {
+        Self {
+            sway: mode.sway,
+            is_trunks: mode.is_trunks,
+        }
+    }
+}
+
 impl SwayFacts {
     /// What was found of the sway, by node index, and of the modes of the whole tree; `None` where some of
     /// it was not looked at.
     pub fn of(
         skeleton: &Skeleton,
         sways: &[Swaying],
-        modes: impl Iterator<Item = Sway>,
+        modes: impl Iterator<Item = KnownMode>,
     ) -> Option<Self> {
         let mut facts = Self::default();
-        if let Some(trunk) = trunk(skeleton)
-            && let Ok(sway) = sways.get(trunk.index())?
-        {
-            let own = sway.frequency_hz;
+        let modes: Vec<KnownMode> = modes.collect();
+        if let Some(trunk) = modes.iter().find(|mode| mode.is_trunks) {
+            let own = trunk.sway.frequency_hz;
             facts.trunk_hz = Some(own.value);
-            facts.trunk_within = (sway.excitation == Excitation::Wind).then(|| own.within());
+            facts.trunk_within = (trunk.sway.excitation == Excitation::Wind).then(|| own.within());
             let slower = modes
-                .map(|mode| mode.frequency_hz)
+                .iter()
+                .map(|mode| mode.sway.frequency_hz)
                 .filter(|hz| hz.hi < own.lo);
             facts.slower_hz = slower.map(|hz| hz.value).min_by(f64::total_cmp);
         }
@@ -177,19 +200,6 @@ impl SwayFacts {
         }
         Some(facts)
     }
-}
-
-/// Of the branches on the foot the one with most points, as everywhere in the analysis of sway.
-fn trunk(skeleton: &Skeleton) -> Option<NodeId> {
-    let mut trunk: Option<NodeId> = None;
-    for id in skeleton.measured_branches() {
-        let node = &skeleton.nodes[id.index()];
-        let has_more = trunk.is_none_or(|t| node.n_tracks > skeleton.nodes[t.index()].n_tracks);
-        if node.level == TRUNK_LEVEL && has_more {
-            trunk = Some(id);
-        }
-    }
-    trunk
 }
 
 impl CaptureFacts {
@@ -468,26 +478,32 @@ mod tests {
         })
     }
 
-    /// Two branches on the foot, of which the first has most of the points.
+    /// Two branches on the foot, of which the first is the trunk, and a mode of a branch that the tree
+    /// lacks.
     #[test]
-    fn the_trunk_is_the_one_that_carries_most_points() {
-        let on_foot = |name: u32, points: u32| Node {
-            level: TRUNK_LEVEL,
-            n_tracks: points,
-            ..Node::made_up(name, Some(0), [0.0, 50.0, 0.0])
-        };
+    fn the_trunk_is_the_one_that_the_analysis_took_for_it() {
         let tree = Skeleton {
             nodes: vec![
                 Node::made_up(0, None, [0.0; 3]),
-                on_foot(1, 90),
-                on_foot(2, 8),
+                Node::made_up(1, Some(0), [0.0, 50.0, 0.0]),
+                Node::made_up(2, Some(0), [0.0, 60.0, 0.0]),
             ],
             foot_px: [0.0; 2].into(),
             image_size: Size::new(64, 64),
         };
         let none = Err(Unidentified::NotMeasured);
-        let slow = || sway(0.4).into_iter();
-        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)], slow()).expect("facts");
+        let facts_of = |trunk: Swaying, other_hz: f64| {
+            let sways = [none, trunk, sway(0.8)];
+            let modes = [trunk, sway(other_hz), sway(0.8)]
+                .into_iter()
+                .zip([true, false, false]);
+            let known = modes.filter_map(|(swaying, is_trunks)| {
+                let sway = swaying.ok()?;
+                Some(KnownMode { sway, is_trunks })
+            });
+            SwayFacts::of(&tree, &sways, known).expect("facts")
+        };
+        let facts = facts_of(sway(0.5), 0.4);
         assert_eq!((facts.identified, facts.trunk_hz), (2, Some(0.5)));
         assert!(
             facts
@@ -496,11 +512,8 @@ mod tests {
         );
         // Its interval and that of 0.5 Hz have nothing in common.
         assert_eq!(facts.slower_hz, Some(0.4));
-        let near = sway(0.46).into_iter();
-        let facts = SwayFacts::of(&tree, &[none, sway(0.5), sway(0.8)], near).expect("facts");
-        assert_eq!(facts.slower_hz, None);
-        let silent = Err(Unidentified::TooUncertain);
-        let facts = SwayFacts::of(&tree, &[none, silent, sway(0.8)], slow()).expect("facts");
+        assert_eq!(facts_of(sway(0.5), 0.46).slower_hz, None);
+        let facts = facts_of(Err(Unidentified::TooUncertain), 0.4);
         assert_eq!((facts.branches, facts.trunk_hz), (2, None));
         assert_eq!((facts.trunk_within, facts.slower_hz), (None, None));
     }

@@ -46,7 +46,7 @@ mod wood;
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
 pub use branch_graph::{BranchGraph, RADIUS_SHARE, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
-pub use capture_facts::{CaptureFacts, FilmCut, PointFacts, Shake, SwayFacts};
+pub use capture_facts::{CaptureFacts, FilmCut, KnownMode, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use depth::{
     DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, METRES_UNIT_M, NodeDepth, Pinhole,

@@ -19,6 +19,8 @@ pub struct ModeSummary {
     pub points: usize,
     /// The measured node whose own mode it is; `None` for a branch that the tree lacks.
     pub node: Option<NodeName>,
+    /// Whether that is the trunk.
+    pub is_trunks: bool,
     /// The botanical branch that this node is on.
     pub branch: Option<String>,
     /// Shares of its kinetic energy in trunk and limbs, the largest first.
@@ -48,6 +50,7 @@ impl ModeSummary {
             collinearity: mode.collinearity,
             points: mode.points,
             node: mode.node.and_then(|node| skeleton.name_of(node)),
+            is_trunks: mode.is_trunks,
             branch: mode.node.map(|node| branches.name(node)),
             energy: mode.energy_by_limb(branches),
         }
@@ -130,6 +133,7 @@ mod tests {
             },
             collinearity: Some(0.97),
             node: Some(NodeId(2)),
+            is_trunks: false,
             points: 9,
             motion_px2: vec![0.0, 24.9, 75.0, 0.1],
         }

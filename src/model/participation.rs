@@ -117,6 +117,7 @@ mod tests {
             },
             collinearity: None,
             node: node.map(NodeId),
+            is_trunks: false,
             points: 4,
             motion_px2: motion_px2.to_vec(),
         }

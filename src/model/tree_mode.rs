@@ -17,6 +17,9 @@ pub struct TreeMode {
     pub collinearity: Option<f64>,
     /// The measured node whose own mode it is; `None` for a branch that the tree lacks.
     pub node: Option<NodeId>,
+    /// Whether that is the branch that the analysis takes for the trunk: the one on the foot with most
+    /// points on it and above. A table of modes does not say it.
+    pub is_trunks: bool,
     /// Points that swing in it.
     pub points: usize,
     /// By measured node: squares of the swing of all points on that node, px².

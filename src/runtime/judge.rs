@@ -92,7 +92,7 @@ pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
 }
 
 fn sway_facts(tree: &Model) -> Option<SwayFacts> {
-    let modes = tree.tree_modes.iter().map(|mode| mode.sway);
+    let modes = tree.tree_modes.iter().map(Into::into);
     SwayFacts::of(&tree.skeleton, &tree.modes, modes)
 }
 

@@ -83,8 +83,7 @@ impl LiveVerdict {
             let branch = sway.branches.get(&node.name);
             sways.push(branch.map_or(Err(Unidentified::NotMeasured), |branch| branch.swaying));
         }
-        let of_tree = sway.modes.iter().map(|mode| mode.sway);
-        SwayFacts::of(&model.skeleton, &sways, of_tree)
+        SwayFacts::of(&model.skeleton, &sways, sway.modes.iter().map(Into::into))
     }
 
     /// `None` in the first second.

@@ -197,6 +197,7 @@ mod tests {
             collinearity: None,
             points: 9,
             node: Some(NodeName(4)),
+            is_trunks: false,
             branch: Some("limb_1".into()),
             energy: Vec::new(),
         };

@@ -237,6 +237,7 @@ fn mode(number: u32) -> ModeSummary {
         collinearity: Some(0.97),
         points: 40,
         node: branch.map(|_| NodeName(number)),
+        is_trunks: number == 1,
         branch: branch.map(|branch| (*branch).to_owned()),
         energy: Vec::new(),
     }
