@@ -85,6 +85,28 @@ impl BranchGraph {
         length_px
     }
 
+    /// The way along the wood from the foot to the end that is farthest from it, px; empty without wood.
+    pub fn longest_way_px(&self) -> Vec<Point2<f64>> {
+        let mut from_foot_px = vec![0.0; self.nodes.len()];
+        let mut end: Option<usize> = None;
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent {
+                let way = node.position_px - self.nodes[parent].position_px;
+                from_foot_px[i] = from_foot_px[parent] + way.norm();
+            }
+            if end.is_none_or(|end| from_foot_px[i] > from_foot_px[end]) {
+                end = Some(i);
+            }
+        }
+        let mut line_px = Vec::new();
+        while let Some(node) = end.and_then(|end| self.nodes.get(end)) {
+            line_px.push(node.position_px);
+            end = node.parent;
+        }
+        line_px.reverse();
+        line_px
+    }
+
     /// The piece of wood that is nearest to a place, as the node in which it ends; `None` where
     /// none is near. `size` is that of the picture.
     pub fn piece_at(&self, at_px: Point2<f64>, size: Size) -> Option<usize> {
@@ -182,6 +204,15 @@ mod tests {
             BranchGraph::default().piece_at(Point2::origin(), size),
             None
         );
+    }
+
+    #[test]
+    fn the_longest_way_leads_from_the_foot_to_the_farthest_end() {
+        let mut graph = fork();
+        graph.nodes.push(WoodNode::made_up(Some(3), 150.0, 60.0));
+        let way = [[100.0, 200.0], [100.0, 100.0], [140.0, 70.0], [150.0, 60.0]];
+        assert_eq!(graph.longest_way_px(), way.map(Point2::from));
+        assert_eq!(BranchGraph::default().longest_way_px(), []);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
+use crate::signal::distance_to_segment;
 use crate::wood::{self, LeafColour, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
@@ -21,6 +22,11 @@ const NEARLY_ALL: f64 = 0.93;
 /// picture may be off. A picture has colours if this share of it has one.
 const GREY_LEVELS: u8 = 4;
 const COLOUR_SHARE: f64 = 0.001;
+
+/// How often a bare tree whose trunk was found is looked at again at most.
+const ROUNDS: usize = 5;
+/// Colours are not learned anew along a line that stays within this of the one before, px: it is drawn so wide.
+const STAYS_PX: f64 = 2.0;
 
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -244,9 +250,44 @@ impl Looked<'_> {
             PhotoError::NoTree if !half.strokes.is_empty() => PhotoError::NoCrownOn,
             why => why,
         })?;
+        let tree = match half.strokes.is_empty() {
+            true => self.again(tree)?,
+            false => tree,
+        };
         let found = Some(found);
         Ok(TreeInPhoto { found, ..tree })
     }
+
+    /// The same tree, if it is bare, with the colours of its wood learned anew along the middle of what was taken
+    /// for wood until that stays (in turns, as Rother et al. 2004 sect. 3). The line that a trunk was found by
+    /// may lie on the dark side of its bark, and ends below the crown: by its colours alone wood is found with
+    /// holes, and too thin.
+    fn again(&self, mut tree: TreeInPhoto) -> Result<TreeInPhoto, PhotoError> {
+        for _ in 0..ROUNDS {
+            let way_px = tree.seen.wood.branches.longest_way_px();
+            if tree.seen.in_leaf || lies_on(&way_px, &tree.strokes[0]) {
+                break;
+            }
+            let attempt = Attempt {
+                crown: tree.crown.clone(),
+                strokes: vec![way_px],
+            };
+            match self.see(attempt) {
+                Ok(next) => tree = next,
+                Err(PhotoError::Cancelled) => return Err(PhotoError::Cancelled),
+                Err(_) => break,
+            }
+        }
+        Ok(tree)
+    }
+}
+
+/// Whether all corners of a line are on another one.
+fn lies_on(line: &Stroke, other: &Stroke) -> bool {
+    line.iter().all(|at| {
+        let mut pieces = other.windows(2);
+        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= STAYS_PX)
+    })
 }
 
 /// Why nothing is seen, by what was drawn: what was only found is no stroke that could be at fault.
@@ -338,5 +379,86 @@ fn closed(size: Size, tree: &[u8]) -> Result<Outline, OutlineError> {
             return Ok(found);
         }
         share *= 2.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::seed_of_part;
+    use nalgebra::Vector2;
+
+    const SIZE: Size = Size {
+        width: 480,
+        height: 360,
+    };
+    const FORK: Point2<f64> = Point2::new(240.0, 200.0);
+
+    /// From where a limb leads, to where, and its radius, px.
+    const LIMBS: [(Point2<f64>, Point2<f64>, f64); 3] = [
+        (Point2::new(240.0, 330.0), FORK, 12.0),
+        (FORK, Point2::new(170.0, 60.0), 8.0),
+        (FORK, Point2::new(320.0, 70.0), 8.0),
+    ];
+
+    /// A bare tree lit from the right, and where its wood is.
+    fn lit_from_the_right() -> (Rgb, Vec<bool>) {
+        let (mut pixels, mut is_wood) = (Vec::new(), Vec::new());
+        for i in 0..SIZE.area() {
+            let at = Point2::new((i % 480) as f64, (i / 480) as f64);
+            let limb = LIMBS
+                .iter()
+                .find(|(from, to, radius)| distance_to_segment(at, *from, *to) <= *radius);
+            let is_lit = limb.is_some_and(|(from, to, _)| {
+                let way = to - from;
+                Vector2::new(-way.y, way.x).dot(&(at - from)) > 0.0
+            });
+            let colour: [u8; 3] = match (limb.is_some(), is_lit) {
+                (true, true) => [110, 94, 79],
+                (true, false) => [50, 42, 36],
+                _ if at.y > 250.0 => [126, 128, 130],
+                _ => [180, 178, 175],
+            };
+            let noise = (seed_of_part(3, i as u64) % 25) as u8;
+            pixels.extend(colour.map(|c| c + noise));
+            is_wood.push(limb.is_some());
+        }
+        (Rgb { size: SIZE, pixels }, is_wood)
+    }
+
+    #[test]
+    fn a_trunk_that_is_found_has_both_sides_of_its_bark() {
+        let (picture, is_wood) = lit_from_the_right();
+        let corners = [
+            [140.0, 30.0],
+            [350.0, 30.0],
+            [350.0, 160.0],
+            [260.0, 215.0],
+            [220.0, 215.0],
+            [140.0, 160.0],
+        ];
+        let drawn = TreeStrokes {
+            crown_px: corners.map(Point2::from).to_vec(),
+            branches_px: Vec::new(),
+        };
+        let options = PhotoOptions {
+            leaf_colour: None,
+            trace_by: TraceBy::Paths,
+        };
+        let found = see_tree(&picture, &drawn, options, &CancelToken::new()).expect("a tree");
+        assert!(found.found.is_some() && !found.seen.in_leaf);
+        let all = is_wood.iter().filter(|is_wood| **is_wood).count();
+        let both = is_wood.iter().zip(&found.seen.tree);
+        let both = both.filter(|(is_wood, seen)| **is_wood && **seen != 0);
+        let share = both.count() as f64 / all as f64;
+        assert!(share > 0.95, "{share}");
+    }
+
+    #[test]
+    fn a_line_stays_if_all_its_corners_do() {
+        let points = |line: &[[f64; 2]]| -> Stroke { line.iter().map(|at| (*at).into()).collect() };
+        let line = points(&[[10.0, 90.0], [10.0, 10.0]]);
+        assert!(lies_on(&points(&[[11.0, 80.0], [9.0, 40.0]]), &line));
+        assert!(!lies_on(&points(&[[11.0, 80.0], [20.0, 10.0]]), &line));
     }
 }
