@@ -265,7 +265,11 @@ impl Looked<'_> {
     fn again(&self, mut tree: TreeInPhoto) -> Result<TreeInPhoto, PhotoError> {
         for _ in 0..ROUNDS {
             let way_px = tree.seen.wood.branches.longest_way_px();
-            if tree.seen.in_leaf || lies_on(&way_px, &tree.strokes[0]) {
+            let stays = tree
+                .strokes
+                .first()
+                .is_none_or(|line| lies_on(&way_px, line));
+            if tree.seen.in_leaf || stays {
                 break;
             }
             let attempt = Attempt {
