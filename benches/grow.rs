@@ -40,7 +40,9 @@ fn main() {
     let written_ms = median_ms(20, |k| {
         let tree = offspring(&still, k);
         let to = dir.path().join(k.to_string());
-        drop(still.write(&to, tree).expect("written"));
+        still
+            .write(&to, tree, &AtomicBool::new(false))
+            .expect("written");
     });
     println!("tree with mesh, leaves and files, at rest: {written_ms:.0} ms (asked: 150 ms)");
     for threads in [1, 2] {

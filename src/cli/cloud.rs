@@ -26,7 +26,6 @@ use pairs::{Pairs, read_pairs};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 
 /// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
 /// that.
@@ -170,9 +169,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let holds_ground = found.figures.ground > 0;
     let tree = args.chosen(found, number)?;
     let mut drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
-    if stop.while_writing().load(Ordering::SeqCst) {
-        return Err(CommandError::Stopped);
-    }
+    let is_stopped = stop.while_writing();
     let branches = drawn.skeleton.botanical_branches().all.len();
     let pieces = drawn.skeleton.measured_branches().count();
     match &film {
@@ -183,13 +180,13 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
                 eprint_line(&format!("arborcam: warning: {warning}"));
                 drawn.note.warnings.push(warning);
             }
-            drawn.write_with_film(&args.out, &film)?;
+            drawn.write_with_film(&args.out, &film, is_stopped)?;
             eprint_line(&format!(
                 "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
                 lies_on(&film.fit)
             ));
         }
-        None => drop(drawn.write(&args.out)?),
+        None => drawn.write(&args.out, is_stopped)?,
     }
     if !holds_ground {
         eprint_line(

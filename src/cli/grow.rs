@@ -143,7 +143,7 @@ impl GrowArgs {
             Some(threads) => usize::from(threads),
             None => std::thread::available_parallelism().map_or(1, usize::from),
         };
-        let grow_one = |number| self.grow_one(parent, number);
+        let grow_one = |number| self.grow_one(parent, number, is_stopped);
         let grown = in_parallel(count, threads, is_stopped, &grow_one, &|done| bar.set(done));
         grown.map_err(|undone| match undone {
             Undone::Stopped => CommandError::Stopped,
@@ -151,10 +151,14 @@ impl GrowArgs {
         })
     }
 
-    fn grow_one(&self, parent: &Parent, number: u64) -> Result<(), PrepareError> {
+    fn grow_one(
+        &self,
+        parent: &Parent,
+        number: u64,
+        is_stopped: &AtomicBool,
+    ) -> Result<(), PrepareError> {
         let tree = parent.offspring(self.seed, number)?;
-        parent.write(&self.out.join(tree_name(number)), tree)?;
-        Ok(())
+        parent.write(&self.out.join(tree_name(number)), tree, is_stopped)
     }
 
     /// # Errors

@@ -8,7 +8,6 @@ use crate::config::Config;
 use crate::files::refuse_taken;
 use clap::Args;
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 #[derive(Debug, Args)]
 pub struct SketchArgs {
@@ -38,10 +37,7 @@ pub fn run(args: &SketchArgs) -> Result<(), CommandError> {
     let flat = read_drawing(&args.strokes)?;
     let tree = stood_up(&args.strokes, &flat, config)?;
     let branches = tree.skeleton.measured_branches().count();
-    if stop.while_writing().load(Ordering::SeqCst) {
-        return Err(CommandError::Stopped);
-    }
-    tree.write(&args.out)?;
+    tree.write(&args.out, stop.while_writing())?;
     let shown = args.out.display();
     let noun = if branches == 1 { "branch" } else { "branches" };
     eprint_line(&format!("{shown}: a tree of {branches} {noun}"));

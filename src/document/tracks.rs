@@ -416,6 +416,18 @@ mod tests {
     use nalgebra::{Similarity2, Vector2};
     use std::fs;
 
+    /// The foot and node 7.
+    fn one_branch() -> Skeleton {
+        Skeleton {
+            nodes: vec![
+                Node::made_up(0, None, [0.0; 3]),
+                Node::made_up(7, Some(0), [0.0, 9.0, 0.0]),
+            ],
+            foot_px: Point2::origin(),
+            image_size: Size::new(640, 480),
+        }
+    }
+
     /// The sway is that of all points.
     #[test]
     fn points_that_were_left_out_are_read_with_the_others() {
@@ -423,14 +435,7 @@ mod tests {
         let write = |file, rows: &str| {
             fs::write(dir.path().join(file), format!("{TRACKS_HEADER}\n{rows}")).unwrap();
         };
-        let skeleton = Skeleton {
-            nodes: vec![
-                Node::made_up(0, None, [0.0; 3]),
-                Node::made_up(7, Some(0), [0.0, 9.0, 0.0]),
-            ],
-            foot_px: Point2::origin(),
-            image_size: Size::new(64, 48),
-        };
+        let skeleton = one_branch();
         let read = || read_film(dir.path(), &skeleton, 60.0, Bounds::new(0.0, 60.0));
         write(TRACKS_FILE, "1,0,0,3.5,4,7\n1,1,0.1,3,4,7\n1,3,0.3,3,5,7\n");
         let older = read().unwrap();
@@ -450,14 +455,7 @@ mod tests {
     #[test]
     fn a_film_is_known_as_its_tables_give_it_back() {
         let dir = tempfile::tempdir().unwrap();
-        let skeleton = Skeleton {
-            nodes: vec![
-                Node::made_up(0, None, [0.0; 3]),
-                Node::made_up(7, Some(0), [0.0, 9.0, 0.0]),
-            ],
-            foot_px: Point2::origin(),
-            image_size: Size::new(640, 480),
-        };
+        let skeleton = one_branch();
         let mut log = TrackLog::new(60.0);
         for frame in 0..90_u32 {
             let turn = 0.1 * f64::from(frame);

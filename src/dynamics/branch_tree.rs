@@ -78,8 +78,8 @@ impl BranchTree {
         std::iter::successors(below(&branch), below)
     }
 
-    /// The same with `trunk`, which all sways with: what seems to stand beside it on the foot, by a
-    /// skeleton that need not be right, may well be carried by it. Of the trunk itself none but the foot.
+    /// The same, and last `trunk` where it is not among them, as the whole tree sways with it: what seems
+    /// to stand beside it on the foot, by a skeleton that need not be right, may well be carried by it.
     pub fn carriers_with(&self, trunk: NodeId, branch: NodeId) -> Vec<NodeId> {
         let mut carriers: Vec<NodeId> = self.carriers(branch).collect();
         if branch != trunk && !carriers.contains(&trunk) {

@@ -7,7 +7,8 @@ use crate::document::note::{CaptureNote, ModelNote, OutlineNote, Source};
 use crate::import::FlatTree;
 use crate::model::{Outline, Pose, Skeleton, Swaying};
 use crate::pipeline::{MOST_RESHAPED, stand_drawn};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// A tree that was not filmed, stood up in space.
 #[derive(Clone, Debug)]
@@ -41,12 +42,13 @@ impl DrawnTree {
         Ok(Self { note, skeleton })
     }
 
-    /// Writes it as a document to `dir`, which appears when it is complete.
+    /// Writes it as a document to `dir`, which appears when it is complete, or not at all: also where `stop`
+    /// is set meanwhile.
     ///
     /// # Errors
-    /// `dir` is there already, or a file cannot be written.
-    pub fn write(self, dir: &Path) -> Result<PathBuf, PrepareError> {
-        self.write_swaying(dir, &[])
+    /// `dir` is there already, a file cannot be written, or it was stopped.
+    pub fn write(self, dir: &Path, stop: &AtomicBool) -> Result<(), PrepareError> {
+        self.write_swaying(dir, &[], stop)
     }
 
     /// The same with the sway of its nodes, by node index.
@@ -54,7 +56,8 @@ impl DrawnTree {
         self,
         dir: &Path,
         sway: &[Swaying],
-    ) -> Result<PathBuf, PrepareError> {
+        stop: &AtomicBool,
+    ) -> Result<(), PrepareError> {
         let draft = Draft {
             note: self.note,
             skeleton: &self.skeleton,
@@ -64,7 +67,7 @@ impl DrawnTree {
             poses: Vec::new(),
             pose_in_picture: None,
         };
-        write_document(dir, draft, sway)
+        write_document(dir, draft, sway, stop)
     }
 
     /// The document that would be read back, with `poses` as its motion.

@@ -14,8 +14,9 @@ use crate::model::{Outline, Pose, Size, Skeleton, Swaying, Unidentified};
 use crate::pipeline::{MOST_RESHAPED, grown_terms, reshape, stand_grown};
 use crate::random::{Generator, generator, seed_of_part};
 use crate::shape::{Terms, is_trunk};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Poses of a loop in wind, Hz.
 const WIND_RATE_HZ: f64 = 30.0;
@@ -279,11 +280,17 @@ impl Parent {
         }
     }
 
-    /// Writes a new tree as a document to `dir`, which appears when it is complete.
+    /// Writes a new tree as a document to `dir`, which appears when it is complete, or not at all: also
+    /// where `stop` is set meanwhile.
     ///
     /// # Errors
-    /// `dir` is there already, or a file cannot be written.
-    pub fn write(&self, dir: &Path, tree: Offspring) -> Result<PathBuf, PrepareError> {
+    /// `dir` is there already, a file cannot be written, or it was stopped.
+    pub fn write(
+        &self,
+        dir: &Path,
+        tree: Offspring,
+        stop: &AtomicBool,
+    ) -> Result<(), PrepareError> {
         let bark = self.document.bark.as_ref();
         let draft = Draft {
             note: self.note(&tree),
@@ -294,7 +301,7 @@ impl Parent {
             poses: tree.poses,
             pose_in_picture: None,
         };
-        write_document(dir, draft, &tree.sway)
+        write_document(dir, draft, &tree.sway, stop)
     }
 
     fn note(&self, tree: &Offspring) -> CaptureNote {

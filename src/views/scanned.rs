@@ -9,7 +9,8 @@ use crate::document::note::{ScanFilmNote, ScanNote};
 use crate::model::{Outline, PointCloud, Swaying};
 use crate::pipeline::ScaledTree;
 use nalgebra::Vector3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
 
 /// A film that was laid on a scan.
 #[derive(Clone, Debug)]
@@ -99,20 +100,20 @@ impl DrawnTree {
 }
 
 impl DrawnTree {
-    /// Writes a scanned tree as a document to `dir`, which appears when it is complete, with the
-    /// sway of a film on it.
+    /// The same as [`write`](Self::write), with the sway of a film on it.
     ///
     /// # Errors
-    /// `dir` is there already, or a file cannot be written.
+    /// As there.
     pub fn write_with_film(
         mut self,
         dir: &Path,
         film: &FilmOnScan,
-    ) -> Result<PathBuf, PrepareError> {
+        stop: &AtomicBool,
+    ) -> Result<(), PrepareError> {
         if let Some(scan) = &mut self.note.scan {
             scan.film = Some(film.note());
         }
-        self.write_swaying(dir, &film.sway)
+        self.write_swaying(dir, &film.sway, stop)
     }
 }
 

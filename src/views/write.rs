@@ -7,11 +7,11 @@ use crate::document::{
     BARK_FILE, Document, MODES_FILE, MOTION_FILE, MotionCsv, PICTURE_FILE, at_rest_files, jpeg, png,
 };
 use crate::export::gltf::{NamedBytes, glb};
-use crate::files::{OutputFolder, WriteError, replace, write_files};
+use crate::files::{OutputFolder, WriteError, replace, write_files, write_folder};
 use crate::model::{
     AtRest, FilmCut, Judgement, Picture, Pose, Rgb, Skeleton, Swaying, TreeMode, UserNotes,
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -166,14 +166,16 @@ pub struct ReadyDocument {
 }
 
 impl ReadyDocument {
-    /// Makes the files of a tree at rest.
+    /// Makes the files of a tree that was not filmed. If it moves all the same, its poses are all of its
+    /// motion.
     ///
     /// # Errors
     /// The tree is none for a model's file, or cannot be read back.
     pub fn of(draft: Draft, sway: &[Swaying]) -> Result<Self, PrepareError> {
         let warnings = draft.note.warnings.clone();
-        let mut writer = DocumentWriter::new(draft)?;
         let mut files = Vec::new();
+        files.extend(motion_csv(&draft)?.map(|table| (MOTION_FILE.to_owned(), table)));
+        let mut writer = DocumentWriter::new(draft)?;
         let put = &mut |name: &str, bytes: Vec<u8>| {
             files.push((name.to_owned(), bytes));
             Ok(())
@@ -186,33 +188,34 @@ impl ReadyDocument {
     }
 }
 
-/// Writes a document of a tree that was not filmed to `dir`, which appears when it is complete. If
-/// it moves all the same, its poses are all of its motion.
+/// Writes a document of a tree that was not filmed to `dir`, which appears when it is complete, or not at
+/// all: also where `stop` is set meanwhile. If it moves all the same, its poses are all of its motion.
 ///
 /// # Errors
-/// `dir` is there already, a file cannot be written, or the tree is none for a model's file.
-pub fn write_document(dir: &Path, draft: Draft, sway: &[Swaying]) -> Result<PathBuf, PrepareError> {
-    let folder = OutputFolder::create(dir)?;
-    let warnings = draft.note.warnings.clone();
-    write_motion(&folder, &draft)?;
-    let found = SwayFound::at_rest(sway);
-    DocumentWriter::new(draft)?.write(&folder, found, warnings, None)?;
-    Ok(folder.publish()?)
+/// `dir` is there already, a file cannot be written, it was stopped, or the tree is none for a model's
+/// file.
+pub fn write_document(
+    dir: &Path,
+    draft: Draft,
+    sway: &[Swaying],
+    stop: &AtomicBool,
+) -> Result<(), PrepareError> {
+    let ready = ReadyDocument::of(draft, sway)?;
+    Ok(write_folder(dir, &ready.files, stop)?)
 }
 
-/// Writes the poses of a tree that was not filmed, if there are any.
-fn write_motion(folder: &OutputFolder, draft: &Draft) -> Result<(), PrepareError> {
+/// The table of the poses of a tree that was not filmed; `None` where it does not move.
+fn motion_csv(draft: &Draft) -> Result<Option<Vec<u8>>, PrepareError> {
     if draft.poses.is_empty() {
-        return Ok(());
+        return Ok(None);
     }
     let skeleton = Arc::new(draft.skeleton.clone());
     let metres_per_px = draft.note.model.as_ref().map_or(0.0, |m| m.metres_per_px);
-    let mut motion = MotionCsv::new(folder.file(MOTION_FILE)?, &skeleton, metres_per_px)?;
+    let mut motion = MotionCsv::new(Vec::new(), &skeleton, metres_per_px)?;
     for pose in &draft.poses {
         motion.pose(pose)?;
     }
-    motion.finish()?;
-    Ok(())
+    Ok(Some(motion.finish()?))
 }
 
 /// Puts other answers on the sway into the document in `dir`: into `nodes.csv` and `modes.csv`,

@@ -6,10 +6,11 @@ use arborcam::document::{CaptureNote, Document};
 use arborcam::model::{NodeKind, Skeleton, Timing};
 use arborcam::pipeline::reshape;
 use arborcam::shape::{Angles, Envelope, envelope_distance};
-use arborcam::views::{Draft, example_outline, write_document};
+use arborcam::views::{Draft, PrepareError, example_outline, write_document};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::sync::atomic::AtomicBool;
 
 const FAILED: i32 = 1;
 const BAD_USAGE: i32 = 2;
@@ -284,8 +285,8 @@ fn bad_input_gets_one_line_and_leaves_nothing() {
     assert_eq!(taken.status.code(), Some(FAILED));
 }
 
-/// Writes the tree of the example without what hangs on its trunk.
-fn write_bare_trunk(to: &Path) {
+/// Writes the tree of the example without what hangs on its trunk, if it is not stopped.
+fn write_bare_trunk(to: &Path, is_stopped: bool) -> Result<(), PrepareError> {
     let filmed = Document::tree(example()).expect("example");
     let mut trunk = Skeleton::clone(&filmed.skeleton);
     let end = trunk.measured_branches().next().expect("a trunk");
@@ -312,14 +313,24 @@ fn write_bare_trunk(to: &Path) {
         poses: Vec::new(),
         pose_in_picture: None,
     };
-    write_document(to, draft, &[]).expect("written");
+    write_document(to, draft, &[], &AtomicBool::new(is_stopped))
+}
+
+#[test]
+fn a_document_is_whole_or_not_there() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let trunk = dir.path().join("trunk");
+    write_bare_trunk(&trunk, true).expect_err("stopped");
+    assert_eq!(fs::read_dir(dir.path()).expect("folder").count(), 0);
+    write_bare_trunk(&trunk, false).expect("written");
+    assert!(Document::tree(&trunk).is_ok());
 }
 
 #[test]
 fn an_example_that_says_nothing_is_refused() {
     let dir = tempfile::tempdir().expect("tempdir");
     let trunk = dir.path().join("trunk");
-    write_bare_trunk(&trunk);
+    write_bare_trunk(&trunk, false).expect("written");
     let cases: [(&[&str], &str); 2] = [
         (&["--count", "1"], "0 forks"),
         (

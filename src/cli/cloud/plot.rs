@@ -9,7 +9,7 @@ use crate::cloud::CloudTrees;
 use crate::files::write_files;
 use crate::views::{StandingTree, scan_forest};
 use anyhow::anyhow;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Where `--points` goes.
 const POINTS_FILE: &str = "points.ply";
@@ -27,9 +27,6 @@ pub(super) fn write(
     print_found(scan, &found);
     let mut standing = Vec::with_capacity(found.trees.len());
     for (number, tree) in (1..).zip(&found.trees) {
-        if is_stopped.load(Ordering::SeqCst) {
-            return Err(CommandError::Stopped);
-        }
         let name = tree_name(number);
         let tree = match tree {
             Ok(tree) => tree,
@@ -42,7 +39,7 @@ pub(super) fn write(
         let branches = drawn.skeleton.botanical_branches().all.len();
         standing.push(StandingTree::of(name.clone(), tree, &drawn));
         let dir = args.out.join(name);
-        drawn.write(&dir)?;
+        drawn.write(&dir, is_stopped)?;
         print_summary(&dir, tree, branches);
     }
     let trees = found.trees.iter().flatten();
