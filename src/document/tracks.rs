@@ -146,20 +146,27 @@ pub fn film_as_read(
     for set in window.sets() {
         let camera = camera::as_read(&set.camera, skeleton.image_size);
         let points = set.observations.iter();
-        let observations = points.map(|o| point_as_read(set, o).seen_by(&camera));
+        let observations = points.map(|o| steady(&point_as_read(set, o), &camera));
         let time_s = number::as_read(set.time_s, TIME_DECIMALS);
         push(&mut log, time_s, observations.collect());
     }
     Film::from_log(log.all(), skeleton, node_of)
 }
 
-fn point_as_read(set: &TrackSet, point: &Observation) -> TrackRow {
+/// A point of a frame where it was filmed.
+fn point_as_read(set: &TrackSet, point: &Observation) -> Observation {
     let filmed_px = set.filmed_px(point);
     let [u_px, v_px] = [filmed_px.x, filmed_px.y].map(|x| number::as_read(x, PX_DECIMALS));
-    TrackRow {
-        time_s: number::as_read(set.time_s, TIME_DECIMALS),
-        observation: at_px(point.id, u_px, v_px),
-        node: None,
+    at_px(point.id, u_px, v_px)
+}
+
+/// A point that was filmed, without the camera's motion.
+fn steady(filmed: &Observation, camera: &CameraMotion) -> Observation {
+    let steady_px = camera.steady_px(filmed.at_px()).cast::<f32>();
+    Observation {
+        u_px: steady_px.x,
+        v_px: steady_px.y,
+        ..*filmed
     }
 }
 
@@ -247,7 +254,7 @@ pub(super) fn read_points(
         for table in &mut tables {
             while let Some(row) = table.take_at(time_s)? {
                 if within_s.contains(time_s) {
-                    observations.push(row.seen_by(&camera));
+                    observations.push(steady(&row.observation, &camera));
                 }
                 if let Some(node) = row.node {
                     node_of.insert(row.observation.id, node);
@@ -272,18 +279,6 @@ struct TrackRow {
     /// Where it was filmed.
     observation: Observation,
     node: Option<NodeId>,
-}
-
-impl TrackRow {
-    /// The point without the camera's motion.
-    fn seen_by(&self, camera: &CameraMotion) -> Observation {
-        let steady_px = camera.steady_px(self.observation.at_px()).cast::<f32>();
-        Observation {
-            u_px: steady_px.x,
-            v_px: steady_px.y,
-            ..self.observation
-        }
-    }
 }
 
 impl<'a> TracksReader<'a> {
@@ -481,8 +476,9 @@ mod tests {
         let mut tracks = TracksCsv::new(file(TRACKS_FILE), false).unwrap();
         let mut camera = CameraCsv::new(file(camera::CAMERA_FILE), skeleton.image_size).unwrap();
         for set in log.all().sets() {
-            let node_of = |id: TrackId| (id.0 < 3).then_some(NodeName(7));
-            tracks.set(set, node_of).unwrap();
+            tracks
+                .set(set, |id| (id.0 < 3).then_some(NodeName(7)))
+                .unwrap();
             camera.set(set).unwrap();
         }
         tracks.finish().unwrap();

@@ -458,9 +458,12 @@ mod tests {
         assert!(share > 0.95, "{share}");
     }
 
+    fn points(line: &[[f64; 2]]) -> Stroke {
+        line.iter().map(|at| (*at).into()).collect()
+    }
+
     #[test]
     fn a_line_stays_if_all_its_corners_do() {
-        let points = |line: &[[f64; 2]]| -> Stroke { line.iter().map(|at| (*at).into()).collect() };
         let line = points(&[[10.0, 90.0], [10.0, 10.0]]);
         assert!(lies_on(&points(&[[11.0, 80.0], [9.0, 40.0]]), &line));
         assert!(!lies_on(&points(&[[11.0, 80.0], [20.0, 10.0]]), &line));

@@ -55,11 +55,7 @@ impl Sheet {
         let window = frame.area();
         let standing = self.standing();
         let newest = self.state.messages().last().unwrap_or(&standing);
-        let named = || {
-            let named = KEYS.iter().filter(|b| !b.short.is_empty());
-            named.map(|b| (b.shown, b.short))
-        };
-        let key_rows = messages::key_rows(named(), window.width).len() as u16;
+        let key_rows = messages::key_rows(named_keys(), window.width).len() as u16;
         let [line, sheet, message, keys] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Fill(1),
@@ -88,12 +84,18 @@ impl Sheet {
         }
         match self.state.drawing {
             Some(_) => messages::keys(frame, &self.state, keys, theme),
-            None => messages::key_line(frame, named(), keys, theme),
+            None => messages::key_line(frame, named_keys(), keys, theme),
         }
         if self.state.help {
             help::of_photograph(frame, &KEYS, &self.state, theme);
         }
     }
+}
+
+/// The keys that have a word beside them on the screen.
+fn named_keys() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let named = KEYS.iter().filter(|b| !b.short.is_empty());
+    named.map(|b| (b.shown, b.short))
 }
 
 impl Sheet {
