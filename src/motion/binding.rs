@@ -164,6 +164,18 @@ impl Binding {
             .filter_map(|(id, bound)| bound.map(|b| (*id, b.node, b.rest_px)))
     }
 
+    /// How many tracks are bound to each measured node or to what it carries; those that have been
+    /// lost among them.
+    pub fn count_tracks(&self) -> Vec<u32> {
+        let mut count = vec![0; self.parents.len()];
+        for (_, node, _) in self.bound() {
+            for carrier in self.carriers(node) {
+                count[carrier.index()] += 1;
+            }
+        }
+        count
+    }
+
     /// The deepest node that a track belongs to.
     pub fn node_of(&self, track: TrackId) -> Option<NodeId> {
         self.tracks.get(&track)?.map(|b| b.node)

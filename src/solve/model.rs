@@ -197,6 +197,7 @@ impl Model {
         self.tree_modes.clear();
         let mut skeleton = self.joined_parts(before, config);
         self.turns = clear_of_filmed(&mut skeleton, &self.turns);
+        self.count_tracks(&mut skeleton);
         self.skeleton = Arc::new(skeleton);
     }
 
@@ -229,6 +230,15 @@ impl Model {
             taper(&mut joined.skeleton.nodes, &joined.seen_px);
         }
         joined.skeleton
+    }
+
+    /// Gives each branch of `skeleton` the number of points that are on it or on what it carries:
+    /// along the wood that is not always what its cluster holds.
+    fn count_tracks(&self, skeleton: &mut Skeleton) {
+        let count = self.binding_on(skeleton).count_tracks();
+        for node in skeleton.foot_and_branches() {
+            skeleton.nodes[node.index()].n_tracks = count[node.index()];
+        }
     }
 
     /// Branches along wood end where a depth camera has seen the ends of the straight ones.

@@ -2,6 +2,7 @@
 
 use crate::support::{self, CLIP, OUTLINE, recording};
 use arborcam::config::Config;
+use arborcam::document::Document;
 use arborcam::model::{Luma, Unidentified};
 use arborcam::outline::{AutoOutline, Found};
 use arborcam::track::WholeView;
@@ -187,6 +188,26 @@ fn the_tree_stands_on_its_foot_and_parents_come_first() {
             "node {i} claims {:?}",
             &node[10..]
         );
+    }
+}
+
+/// Along the wood a branch may carry others than the motion alone says: it has the points of those
+/// that it carries now.
+#[test]
+fn a_branch_has_the_points_of_what_it_carries() {
+    let read = Document::read(&made().out(), 0.0).expect("a capture");
+    let skeleton = read.skeleton;
+    let mut carried = vec![0; skeleton.nodes.len()];
+    let mut carriers = 0;
+    for node in skeleton.measured_branches() {
+        if let Some(carrier) = skeleton.moving_parent(node) {
+            carried[carrier.index()] += skeleton.nodes[node.index()].n_tracks;
+            carriers += u32::from(carrier.index() > 0);
+        }
+    }
+    assert!(carriers > 5, "{carriers} branches on others");
+    for (node, carried) in skeleton.nodes.iter().zip(carried) {
+        assert!(node.n_tracks >= carried, "{:?}: {carried}", node.name);
     }
 }
 
