@@ -17,6 +17,17 @@ pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
     done
 }
 
+/// From now on panics that are caught print nothing: what is wrong is said in one line by who caught
+/// them.
+pub fn print_only_uncaught() {
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !catching() {
+            print(panic);
+        }
+    }));
+}
+
 /// Whether a panic on this thread would be caught by [`caught`]. A hook runs before anything is
 /// caught, and must not take such a panic for the end.
 pub fn catching() -> bool {

@@ -7,7 +7,7 @@ use std::io::Cursor;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let format = match bytes.first() {
-        // LAS and E57 are read by crates whose panics are caught; a fuzzer ends at them all the same.
+        // LAS and E57 have a target of their own.
         Some(b'p') => CloudFormat::Ply,
         Some(b'V' | b'#') => CloudFormat::Pcd,
         _ => CloudFormat::Text,

@@ -8,7 +8,8 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let name = match bytes.first() {
         Some(b'g' | b'{') => "fuzz.glb",
         Some(b'p') => "fuzz.ply",
-        Some(b'I') => "fuzz.csv",
+        Some(b'I' | b'c') => "fuzz.csv",
+        Some(b'#' | b'h' | b'x') => "fuzz.txt",
         _ => "fuzz.obj",
     };
     let _ = read_model(bytes, Path::new(name)).map(|model| FlatModel::of(&model.tree, 3));

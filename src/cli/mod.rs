@@ -39,6 +39,7 @@ mod supervisor;
 mod tree;
 mod unused;
 
+use crate::caught::print_only_uncaught;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
@@ -95,6 +96,7 @@ enum Command {
 
 /// Runs the command that the arguments name.
 pub fn main() -> ExitCode {
+    print_only_uncaught();
     let cli = match parsed() {
         Ok(cli) => cli,
         Err(e) => return print_parse_error(&e),

@@ -67,10 +67,13 @@ impl ImportError {
         }
     }
 
-    /// Its bytes cannot be read; one that ends too early is damaged.
+    /// Its bytes cannot be read; one that ends too early, or names a place that no file has, is damaged.
     pub(super) fn unreadable(e: &std::io::Error) -> Self {
         match e.kind() {
             std::io::ErrorKind::UnexpectedEof => Self::bad_format("it is cut off"),
+            std::io::ErrorKind::InvalidInput => {
+                Self::bad_format("its header names a place that is not in it")
+            }
             _ => Self::Unreadable { why: e.to_string() },
         }
     }

@@ -166,7 +166,7 @@ fn no_drawing_and_no_model_brings_the_readers_down() {
     }
     for seed in seeds("model") {
         // As each kind of file.
-        for name in ["seed.glb", "seed.obj", "seed.ply", "seed.csv"] {
+        for name in ["seed.glb", "seed.obj", "seed.ply", "seed.csv", "seed.txt"] {
             each(&seed, |bytes| {
                 let tree = read_model(bytes, Path::new(name))
                     .and_then(|model| FlatModel::of(&model.tree, 3).map(|_| model));
@@ -203,5 +203,27 @@ fn no_cloud_brings_the_readers_down() {
     assert!(
         read > 200,
         "hardly anything was ever read: this shows nothing"
+    );
+}
+
+/// LAS, LAZ and E57, which crates read: the same.
+#[test]
+fn no_scan_brings_the_readers_down() {
+    let mut read = 0;
+    for seed in seeds("scan") {
+        let format = match seed.first() {
+            Some(b'L') => CloudFormat::Las,
+            _ => CloudFormat::E57,
+        };
+        each(&seed, |bytes| {
+            match read_cloud(Cursor::new(bytes.to_vec()), format, None) {
+                Ok(_) => read += 1,
+                Err(e) => assert!(!e.to_string().contains('\n'), "one line"),
+            }
+        });
+    }
+    assert!(
+        read > 60,
+        "hardly anything was ever read: this shows nothing ({read})"
     );
 }

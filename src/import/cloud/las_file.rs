@@ -9,8 +9,9 @@ use std::io::{BufRead, Read, Seek, SeekFrom};
 
 /// A byte holds no more compressed points than that: equal points take an eighth of a bit each.
 const MOST_POINTS_OF_BYTE: u64 = 64;
-/// Points that are read at a time.
+/// Points that are read at a time, and their bytes: a header may say that each point has 65,535.
 const PIECE: u64 = 65_536;
+const PIECE_BYTES: u64 = 1 << 22;
 /// Where the header of LAS 1.4 has the place of its first extended record, how long the head of such
 /// a record is, and where in it its length is.
 const EVLR_AT: usize = 235;
@@ -99,11 +100,11 @@ where
             }
         }
     }
+    let of_point = u64::from(reader.header().point_format().len()).max(1);
+    let most = PIECE.min(PIECE_BYTES / of_point);
     let mut read = 0;
     while read < said {
-        let piece = reader
-            .read_points(PIECE.min(said - read))
-            .map_err(damaged)?;
+        let piece = reader.read_points(most.min(said - read)).map_err(damaged)?;
         if piece.is_empty() {
             break;
         }

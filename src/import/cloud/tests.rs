@@ -160,6 +160,18 @@ fn las_and_laz_are_read_whatever_extent_they_claim() {
             Err(ImportError::TooMany { .. })
         ));
     }
+    // Points of 65,535 bytes each, of which a piece at once would be 1.3 GB.
+    let mut lie = las_file(&points, false);
+    lie[105..107].fill(0xff);
+    lie[107..111].fill(0);
+    lie[247..255].copy_from_slice(&20_000_u64.to_le_bytes());
+    assert!(read_bytes(&lie, CloudFormat::Las).is_err());
+    // A place that no file has is damage, not a file that cannot be read.
+    let nowhere = std::io::Error::from(std::io::ErrorKind::InvalidInput);
+    assert!(matches!(
+        ImportError::unreadable(&nowhere),
+        ImportError::BadFormat { .. }
+    ));
     // An extended record that says to be of any length.
     let mut lie = las_file(&points, false);
     let end = lie.len() as u64;
