@@ -210,7 +210,7 @@ impl FrontEnd {
         if let Some(off_px) = tracker.take_tag_dispute() {
             self.tag.dispute(off_px);
         }
-        MarkerStage::join(&markers, &mut tracks);
+        self.markers.join(&markers, &mut tracks);
         if let (Some(reader), Some(image)) = (&self.depth, &frame.depth) {
             look_up_depths(reader, image, frame.luma.size, &mut tracks);
             self.depth_gate.step(&mut tracks.observations);

@@ -5,6 +5,7 @@ use crate::depth::{DepthGate, DepthReader};
 use crate::markers::{MarkerError, MarkerEvent, MarkerPlace, MarkerTracker, Scene};
 use crate::model::{Background, DepthImage, Frame, Observation, Outline, Size, TrackId, TrackSet};
 use nalgebra::Point2;
+use std::collections::BTreeSet;
 
 /// Side of the window around a marker that is picked, px at 640 px.
 const PICKED_SIDE_PX: f64 = 16.0;
@@ -33,6 +34,8 @@ pub(super) struct MarkerStage {
     tracker: Option<MarkerTracker>,
     /// Picked in the picture, px; they are taken in the next frame.
     picked_px: Vec<Point2<f64>>,
+    /// Those that are in the tracks.
+    joined: BTreeSet<TrackId>,
     error: Option<MarkerError>,
     /// There are others than before.
     are_new: bool,
@@ -44,6 +47,7 @@ impl MarkerStage {
             settings: settings.clone(),
             tracker: None,
             picked_px: Vec::new(),
+            joined: BTreeSet::new(),
             error: None,
             are_new: false,
         }
@@ -80,7 +84,7 @@ impl MarkerStage {
     }
 
     /// Adds the markers of a frame to its tracks, without the camera's motion.
-    pub fn join(markers: &[MarkerPlace], tracks: &mut TrackSet) {
+    pub fn join(&mut self, markers: &[MarkerPlace], tracks: &mut TrackSet) {
         if tracks.camera.background == Background::Lost {
             return;
         }
@@ -89,6 +93,7 @@ impl MarkerStage {
         let points = &tracks.observations;
         let confirmed = points.is_empty() || points.iter().any(|o| o.confirmed);
         for marker in markers {
+            tracks.born += u32::from(self.joined.insert(marker.id));
             let steady_px = tracks.camera.steady_px(marker.at_px).cast::<f32>();
             tracks.observations.push(Observation {
                 id: marker.id,

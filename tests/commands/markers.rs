@@ -171,6 +171,14 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
             );
         }
     }
+    let note = fs::read_to_string(scene.path("out/capture.json")).expect("note");
+    let note: serde_json::Value = serde_json::from_str(&note).expect("JSON");
+    let [total, alive] =
+        ["tracks_total", "tracks_alive_end"].map(|k| note["quality"][k].as_u64().expect("a count"));
+    assert!(
+        2 <= alive && alive <= total,
+        "{alive} of {total} points, markers among them"
+    );
     let found = branches(&scene, "out --markers");
     let named: Vec<&str> = found.iter().filter_map(|b| b["branch"].as_str()).collect();
     assert_eq!(named, ["A", "B"]);
