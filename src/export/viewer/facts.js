@@ -3,6 +3,9 @@
 const interval = (low, high, digits) =>
   low === null || high === null ? "" : ` (${low.toFixed(digits)} to ${high.toFixed(digits)})`;
 
+// Beside what only a branch that moves on the page has.
+const NO_MOTION = " does not move here";
+
 // Pairs of a term and its value, with a small addition or none.
 export function facts(branch, sway) {
   const original = branch.original;
@@ -23,9 +26,10 @@ export function facts(branch, sway) {
     }
   } else {
     if (original.why) rows.push(["Identified", "none", ` ${original.why}`]);
-    rows.push(["Frequency", sway.hz === null ? "–" : `${sway.hz.toFixed(2)} Hz`, sway.hz === null ? " none stands out" : " peak"]);
+    const without = sway.amplitude === null ? NO_MOTION : " none stands out";
+    rows.push(["Frequency", sway.hz === null ? "–" : `${sway.hz.toFixed(2)} Hz`, sway.hz === null ? without : " peak"]);
   }
-  rows.push(["Amplitude", sway.amplitude === null ? "–" : `${sway.amplitude.toFixed(2)}°`, ""]);
+  rows.push(["Amplitude", sway.amplitude === null ? "–" : `${sway.amplitude.toFixed(2)}°`, sway.amplitude === null ? NO_MOTION : ""]);
   return rows;
 }
 
