@@ -15,6 +15,8 @@ const OUT_OF_ROUND: f64 = 0.25;
 const FOOT_SHARE: f64 = 0.15;
 /// ... and in it the lowest circles say how thick it is.
 const FOOT_CIRCLES: usize = 5;
+/// A branch is large if it is at least this share of the tree's height long: shoots at the foot are not.
+const LARGE_SHARE: f64 = 0.15;
 /// Of all circles of a tree this share is thinner than its thickest wood: single ones about forks are too
 /// large.
 const THICKEST_QUANTILE: f64 = 0.98;
@@ -45,18 +47,33 @@ pub(super) fn on_wood(paths: &[Path], points: &[Point3<f32>], cell: f64) -> f64 
 pub(super) fn foot_share(paths: &[Path]) -> Option<f64> {
     let trunk = paths.first()?;
     let bottom = trunk.places.first()?.at.z;
-    let top = paths
-        .iter()
-        .flat_map(|path| &path.places)
-        .map(|place| place.at.z)
-        .fold(bottom, f64::max);
-    let low = bottom + FOOT_SHARE * (top - bottom);
+    let low = bottom + FOOT_SHARE * (top(paths, bottom) - bottom);
     let lowest = circles(trunk).filter(|(z, _)| *z <= low);
     let lowest = lowest.map(|(_, circle)| circle.radius).take(FOOT_CIRCLES);
     let foot = median(lowest.collect(), f64::total_cmp)?;
     let all = paths.iter().flat_map(circles);
     let radii = all.map(|(_, circle)| circle.radius).collect();
     Some(foot / quantile(radii, THICKEST_QUANTILE)?)
+}
+
+/// How high the lowest large branch leaves the trunk, as a share of the tree's height; `None` where no
+/// such one does.
+pub(super) fn clear_stem(paths: &[Path]) -> Option<f64> {
+    let trunk = paths.first()?;
+    let bottom = trunk.places.first()?.at.z;
+    let height = top(paths, bottom) - bottom;
+    let is_large = |path: &&Path| path.length_from(0) >= LARGE_SHARE * height;
+    let joints = paths.iter().filter(is_large).filter_map(|path| path.on);
+    let heights = joints
+        .filter(|on| on.path == 0)
+        .map(|on| (trunk.places[on.place].at.z - bottom) / height);
+    heights.min_by(f64::total_cmp)
+}
+
+/// The highest place, m; `bottom` of none.
+fn top(paths: &[Path], bottom: f64) -> f64 {
+    let places = paths.iter().flat_map(|path| &path.places);
+    places.map(|place| place.at.z).fold(bottom, f64::max)
 }
 
 /// The circles of a path from its base on, and their heights, m.
@@ -70,7 +87,7 @@ fn circles(path: &Path) -> impl Iterator<Item = (f64, Measured)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::paths::Place;
+    use super::super::paths::{Joint, Place};
     use super::*;
 
     /// A path up with these radii, 0.1 m apart, and four points round every place.
@@ -108,6 +125,20 @@ mod tests {
         assert_eq!(on_wood(&paths, &points, 0.01), 0.75);
         // Points that are one in so coarse a cell are known no better.
         assert_eq!(on_wood(&paths, &points, 0.12), 1.0);
+    }
+
+    #[test]
+    fn the_stem_is_clear_up_to_the_lowest_large_branch() {
+        let (trunk, _) = upright(&[0.1; 51]);
+        let mut paths = vec![trunk];
+        assert_eq!(clear_stem(&paths), None);
+        for (place, length) in [(5, 3), (20, 20), (30, 15)] {
+            let (mut branch, _) = upright(&vec![0.02; length]);
+            branch.on = Some(Joint { path: 0, place });
+            paths.push(branch);
+        }
+        let clear = clear_stem(&paths).expect("a branch");
+        assert!((clear - 0.4).abs() < 1e-9, "{clear}");
     }
 
     #[test]

@@ -175,6 +175,7 @@ fn tree_of(
     mut figures: CloudFigures,
 ) -> Result<CloudTree, CloudError> {
     figures.in_leaf = options.in_leaf;
+    figures.has_ground = standing.ground.is_some();
     if options.in_leaf {
         linked = linked.without_leaves(standing, &mut figures)?;
     }
@@ -221,6 +222,7 @@ fn tree_of(
     let noise = radius::noise(&paths);
     // The trunk forgets the circles at its foot when it is led down to the ground.
     figures.foot_share = fit::foot_share(&paths);
+    figures.clear_stem = fit::clear_stem(&paths);
     base::stand(&mut paths, base, |at| standing.ground_at(at));
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);

@@ -57,6 +57,11 @@ pub struct CloudFigures {
     /// How thick the foot of the trunk is against the thickest wood; `None` where no circle was found
     /// on the trunk.
     pub foot_share: Option<f64>,
+    /// Whether ground was found below it.
+    pub has_ground: bool,
+    /// Height of the lowest large branch above the foot, as a share of the tree's; `None` where none
+    /// leaves the trunk.
+    pub clear_stem: Option<f64>,
 }
 
 impl CloudFigures {

@@ -145,6 +145,10 @@ pub struct ScanNote {
     /// How thick the foot is against the thickest wood; `null` where no round trunk was found there.
     #[serde(default)]
     pub foot_share: Option<f64>,
+    /// Height of the lowest large branch above the foot, as a share of the tree's; `null` where there is
+    /// none.
+    #[serde(default)]
+    pub clear_stem: Option<f64>,
     /// The film that was laid on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<ScanFilmNote>,

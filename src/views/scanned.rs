@@ -135,6 +135,7 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         twig_radius_m: figures.twig_radius_m,
         on_wood: Some(figures.on_wood),
         foot_share: figures.foot_share,
+        clear_stem: figures.clear_stem,
         film: None,
     }
 }

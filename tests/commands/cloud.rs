@@ -268,6 +268,16 @@ fn a_tree_on_its_head_is_no_good_tree() {
     assert!(line.contains("foot") && line.contains("z is up"), "{line}");
 }
 
+/// Its thickest wood is at the cut, as a tree's is at the foot.
+#[test]
+fn a_crown_without_its_trunk_is_no_good_tree() {
+    let mut crown = points_on(&TUBES, 0.012, 0.003, &mut Chance::new(7));
+    crown.retain(|p| p.z > 1.4);
+    let line = verdict(&crown);
+    assert!(line.starts_with("verdict: fair, because: "), "{line}");
+    assert!(line.contains("a crown without its trunk"), "{line}");
+}
+
 #[test]
 fn units_are_taken_as_given() {
     let dir = tempfile::tempdir().expect("tempdir");
