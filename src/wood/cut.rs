@@ -144,6 +144,11 @@ impl Flow {
             orphans: VecDeque::new(),
         };
         for pixel in 0..size.area() {
+            // What is neither one nor the other and is linked to nothing stays so; memory that is not written
+            // to takes no time.
+            if odds[pixel] == 0.0 && links[pixel] == [0.0; PAIRS] {
+                continue;
+            }
             let at = flow.framed(pixel);
             flow.from_label[at] = grains(odds[pixel].clamp(-SURE, SURE));
             for (direction, cost) in (0..).zip(links[pixel]) {
