@@ -16,8 +16,6 @@ pub(super) const FILE: &str = "nodes.csv";
 const MOST_NODES: usize = 1 << 16;
 /// Nodes that a later change adds get numbers above those there are.
 const LARGEST_NAME: u32 = u32::MAX / 2;
-/// What `kind` says of a node that repeats another one.
-const COPY: &str = "copy";
 /// The column that a file may lack: then every node moves on its own.
 const MOVES_WITH: &str = "moves_with";
 
@@ -81,7 +79,7 @@ pub fn nodes<W: Write>(
         for cell in sway::cells(&swaying.unwrap_or(Err(Unidentified::NotMeasured))) {
             table.text(&cell);
         }
-        table.text(original.map_or(node.kind.word(), |_| COPY));
+        table.text(original.map_or(node.kind.word(), |_| NodeKind::COPY));
         table.id(original);
         match original {
             Some(_) => table.number(node.plane_angle.to_degrees(), 4),
@@ -249,7 +247,7 @@ impl<R: Read> NodeRows<R> {
             moves_with: None,
         };
         match table.cell(8) {
-            COPY => self.copy(&mut node)?,
+            NodeKind::COPY => self.copy(&mut node)?,
             word => node.kind = self.kind(word)?,
         }
         Ok(node)

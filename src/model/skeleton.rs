@@ -38,6 +38,8 @@ pub enum NodeKind {
 
 impl NodeKind {
     pub const ALL: [Self; 4] = [Self::Measured, Self::Shoot, Self::Grown, Self::Traced];
+    /// What files say of a node that repeats another one, in place of that one's kind.
+    pub const COPY: &str = "copy";
 
     /// One word for files.
     pub fn word(self) -> &'static str {
