@@ -32,6 +32,8 @@ mod scanned;
 #[cfg(feature = "opencv")]
 mod seeds;
 mod seen;
+#[cfg(feature = "opencv")]
+mod settling;
 mod sway;
 #[cfg(feature = "opencv")]
 mod tagged;

@@ -8,6 +8,7 @@ use arborcam::import::{Sketch, read_strokes};
 use arborcam::model::TreeStrokes;
 use arborcam::pipeline::{PhotoOptions, see_tree};
 use arborcam::source::Photograph;
+use arborcam::wood::LeafHint;
 use std::path::Path;
 
 const REPEATS: usize = 5;
@@ -32,7 +33,7 @@ fn line(folder: &Path) -> String {
         branches_px: strokes(folder, "trunk.json").lines_px(),
     };
     let options = PhotoOptions {
-        leaf_colour: None,
+        leaves: LeafHint::Unknown,
         trace_by: TraceBy::Paths,
     };
     let look = || see_tree(&photo.picture, &drawn, options, &CancelToken::new()).expect("a tree");

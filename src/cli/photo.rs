@@ -21,7 +21,7 @@ use crate::views::{
     Attracting, ForestPlan, PhotoDepth, PhotoExample, PhotoGrowth, PhotoParts, PhotoTree,
     PhotoTreeError, ReadyDocument, StandingPlaces, photo_defaults, photo_forest,
 };
-use crate::wood::LeafColour;
+use crate::wood::{LeafColour, LeafHint};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use drawn::{DrawnTree, StrokeFiles};
@@ -41,15 +41,16 @@ pub struct PhotoArgs {
     /// so on, which --tree takes again.
     #[arg(long)]
     draw: bool,
-    /// The colour by which leaves are known. A crown without leaves of it is an error; if no colour is
-    /// given they are green, and a tree without them is bare.
+    /// The colour by which leaves are known, or that the tree is bare: then none are looked for. A crown
+    /// without leaves of a colour that is given is an error; if nothing is given they are green, and a tree
+    /// without them is bare.
     #[arg(long, value_name = "COLOUR")]
     foliage: Option<Foliage>,
     /// A tree whose branches those that are not seen are like, and whose sway the tree is given: a
     /// capture, or what else `grow` takes as an example.
     #[arg(long, value_name = "EXAMPLE")]
     like: Option<PathBuf>,
-    /// Where branches grow on others, if the photograph shows too few to learn from.
+    /// Where branches grow on others, if the photograph shows too few to learn from; or that none are made up.
     #[arg(long, value_name = "WHERE", default_value = "both")]
     subtrees: Subtrees,
     /// How the branches that are seen come into space.
@@ -81,6 +82,8 @@ enum Foliage {
     Red,
     Yellow,
     White,
+    /// There are no leaves.
+    Bare,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -90,14 +93,18 @@ enum Subtrees {
     /// Along others (type II).
     Along,
     Both,
+    /// Nowhere: the tree has only the branches that are seen.
+    None,
 }
 
-impl From<Subtrees> for SubtreeKind {
-    fn from(kind: Subtrees) -> Self {
-        match kind {
-            Subtrees::AtEnd => Self::AtEnd,
-            Subtrees::Along => Self::Along,
-            Subtrees::Both => Self::Both,
+impl Subtrees {
+    /// `None` where nothing is to grow.
+    fn kind(self) -> Option<SubtreeKind> {
+        match self {
+            Self::AtEnd => Some(SubtreeKind::AtEnd),
+            Self::Along => Some(SubtreeKind::Along),
+            Self::Both => Some(SubtreeKind::Both),
+            Self::None => None,
         }
     }
 }
@@ -136,13 +143,14 @@ impl From<Depth> for PhotoDepth {
     }
 }
 
-impl From<Foliage> for LeafColour {
+impl From<Foliage> for LeafHint {
     fn from(colour: Foliage) -> Self {
         match colour {
-            Foliage::Green => Self::Green,
-            Foliage::Red => Self::Red,
-            Foliage::Yellow => Self::Yellow,
-            Foliage::White => Self::White,
+            Foliage::Green => Self::Of(LeafColour::Green),
+            Foliage::Red => Self::Of(LeafColour::Red),
+            Foliage::Yellow => Self::Of(LeafColour::Yellow),
+            Foliage::White => Self::Of(LeafColour::White),
+            Foliage::Bare => Self::Bare,
         }
     }
 }
@@ -158,7 +166,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     }
     let mut drawn = args.strokes.on(&shown)?;
     let options = PhotoOptions {
-        leaf_colour: args.foliage.map(LeafColour::from),
+        leaves: args.foliage.map_or(LeafHint::Unknown, LeafHint::from),
         trace_by: config.skeleton.trace_by,
     };
     if args.draw {
@@ -177,7 +185,7 @@ pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
     }
     print_doubts(&shown, &seen, &drawn);
     let growth = PhotoGrowth {
-        subtrees: args.subtrees.into(),
+        subtrees: args.subtrees.kind(),
         like: like.as_ref(),
         depth: args.depth.into(),
         attractors: args.attractors.into(),
@@ -356,7 +364,7 @@ fn found_note(tree: &TreeInPhoto, drawn: &DrawnTree) -> Option<String> {
 /// What is doubtful of a tree.
 fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
     let mut warnings = Vec::new();
-    if !tree.has_colour {
+    if !tree.has_colour && !tree.is_said_bare {
         warnings.push(
             "the photograph has no colours, by which leaves are known: the tree is taken to be bare"
                 .to_owned(),

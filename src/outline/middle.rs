@@ -11,27 +11,40 @@ use opencv::prelude::*;
 const ROUNDS: i32 = 5;
 /// Margins to the sides that hold no tree, as shares of the picture's width. The margin above and below is a
 /// share of the height.
-const MARGINS: [f64; 2] = [0.2, 0.15];
+const WIDE_MARGIN: f64 = 0.2;
+const NARROW_MARGIN: f64 = 0.15;
 const MARGIN_ABOVE: f64 = 0.04;
 /// Gaps up to this are closed, px.
 const CLOSE_PX: u32 = 2;
 
-/// What stands in the middle of a picture (a reduced one: large ones take long), as each of two margins
-/// gives it, the wider one first; nothing where nothing differs from what is about it.
+/// How wide the margins are that hold no tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Margin {
+    Wide,
+    Narrow,
+}
+
+impl Margin {
+    fn share(self) -> f64 {
+        match self {
+            Self::Wide => WIDE_MARGIN,
+            Self::Narrow => NARROW_MARGIN,
+        }
+    }
+}
+
+/// What stands in the middle of a picture (a reduced one: large ones take long); `None` where nothing differs
+/// from what is about it.
 ///
 /// # Errors
 /// OpenCV fails.
-pub fn in_middle(picture: &Rgb) -> opencv::Result<Vec<Outline>> {
+pub fn in_middle(picture: &Rgb, margin: Margin) -> opencv::Result<Option<Outline>> {
     let size = picture.size;
     let (rows, cols) = (size.height as i32, size.width as i32);
     let bytes = Mat::new_rows_cols_with_data(rows, 3 * cols, &picture.pixels)?;
     let colours = bytes.reshape(3, rows)?.try_clone()?;
-    let mut outlines = Vec::with_capacity(MARGINS.len());
-    for margin in MARGINS {
-        let mask = within(&colours, size, margin)?;
-        outlines.extend(region::close_to_one(size, &mask, CLOSE_PX)?);
-    }
-    Ok(outlines)
+    let mask = within(&colours, size, margin.share())?;
+    region::close_to_one(size, &mask, CLOSE_PX)
 }
 
 /// What differs from what is beyond the margins, 255 or 0, row by row.
@@ -90,9 +103,9 @@ mod tests {
 
     #[test]
     fn a_tree_before_the_sky_is_found() {
-        let found = in_middle(&picture()).expect("opencv");
-        assert_eq!(found.len(), 2);
-        for outline in found {
+        for margin in [Margin::Wide, Margin::Narrow] {
+            let found = in_middle(&picture(), margin).expect("opencv");
+            let outline = found.expect("a tree");
             let area = outline.mask.iter().filter(|m| **m != 0).count();
             assert!((8000..9800).contains(&area), "{area}");
             assert!(outline.contains(150.0, 175.0) && !outline.contains(120.0, 160.0));

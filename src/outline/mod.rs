@@ -22,7 +22,7 @@ pub use auto::{AutoOutline, Found, whole};
 pub use density::{DensityError, density};
 pub use error::OutlineError;
 pub use matting::{alpha, outline as from_scribbles};
-pub use middle::in_middle;
+pub use middle::{Margin, in_middle};
 pub use polygon::{PolygonFile, crossing, outline as from_polygon};
 pub use reduced::Reduced;
 pub use scribbles::{Given, Mark, Scribbles};

@@ -19,13 +19,21 @@ pub struct Reduced {
 }
 
 impl Reduced {
-    /// A picture that is no wider than is looked at stays as large as it is.
+    /// In the size in which a tree is looked for.
     ///
     /// # Errors
     /// OpenCV fails.
     pub fn of(picture: &Rgb) -> opencv::Result<Self> {
+        Self::to_width(picture, REDUCED_WIDTH)
+    }
+
+    /// A picture that is no wider than this (px) stays as large as it is.
+    ///
+    /// # Errors
+    /// OpenCV fails.
+    pub fn to_width(picture: &Rgb, width: u32) -> opencv::Result<Self> {
         let whole = picture.size;
-        let width = REDUCED_WIDTH.min(whole.width);
+        let width = width.min(whole.width);
         let height = (whole.height * width).div_ceil(whole.width).max(1);
         let size = Size::new(width, height);
         let (rows, cols) = (whole.height as i32, whole.width as i32);
@@ -47,6 +55,12 @@ impl Reduced {
     /// A place of the reduced picture, px of the whole one.
     pub fn to_whole(&self, at_px: Point2<f64>) -> Point2<f64> {
         let scale = f64::from(self.whole.width) / f64::from(self.picture.size.width);
+        at_px.map(|px| (px + 0.5) * scale - 0.5)
+    }
+
+    /// A place of the whole picture, px of the reduced one.
+    pub fn to_reduced(&self, at_px: Point2<f64>) -> Point2<f64> {
+        let scale = f64::from(self.picture.size.width) / f64::from(self.whole.width);
         at_px.map(|px| (px + 0.5) * scale - 0.5)
     }
 

@@ -3,14 +3,14 @@
 //! and after every stroke by a screen.
 
 use super::certainty::Certainty;
+use super::settling::Settling;
 use super::unaided::{Attempt, Half, Place};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
-use crate::signal::distance_to_segment;
-use crate::wood::{self, LeafColour, NotSeen, SeenInPhotograph, Stroke};
+use crate::wood::{self, LeafColour, LeafHint, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
 /// Gaps between leaves up to this share of the photograph's width are closed; up to the second where one
@@ -23,17 +23,10 @@ const NEARLY_ALL: f64 = 0.93;
 const GREY_LEVELS: u8 = 4;
 const COLOUR_SHARE: f64 = 0.001;
 
-/// How often a bare tree whose trunk was found is looked at again at most.
-const ROUNDS: usize = 5;
-/// Colours are not learned anew along a line that stays within this of the one before, px: it is drawn so wide.
-const STAYS_PX: f64 = 2.0;
-
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotoOptions {
-    /// The colour of the leaves where it is known: then there must be some. Else green leaves are looked
-    /// for, and a tree without them is bare.
-    pub leaf_colour: Option<LeafColour>,
+    pub leaves: LeafHint,
     pub trace_by: TraceBy,
 }
 
@@ -49,6 +42,8 @@ pub struct TreeInPhoto {
     pub seen: SeenInPhotograph,
     /// Whether the photograph has colours; else leaves are not looked for.
     pub has_colour: bool,
+    /// Whether the tree was said to be bare.
+    pub is_said_bare: bool,
 }
 
 /// A part of what is drawn on a photograph.
@@ -196,7 +191,7 @@ impl Looked<'_> {
             picture: self.picture,
             crown: &crown,
             strokes: &strokes,
-            leaf_colour: self.options.leaf_colour,
+            leaves: self.options.leaves,
             trace_by: self.options.trace_by,
         };
         let seen = wood::in_photograph(view, self.cancel).map_err(|e| not_seen(e, self.drawn))?;
@@ -216,82 +211,111 @@ impl Looked<'_> {
             found: None,
             seen,
             has_colour: self.has_colour,
+            is_said_bare: self.options.leaves == LeafHint::Bare,
         })
     }
 
     /// Of all attempts to find what was not drawn the one that is most likely right.
     fn best(&self, half: &Half) -> Result<TreeInPhoto, PhotoError> {
-        let colour = self.options.leaf_colour.unwrap_or_default();
         let reduced = Reduced::of(self.picture).map_err(failed)?;
-        let mut best: Option<(Certainty, TreeInPhoto)> = None;
+        let settling = match half.strokes.is_empty() {
+            true => Some(Settling::of(self.picture, self.options, self.cancel).map_err(failed)?),
+            false => None,
+        };
+        let mut best: Option<(Certainty, FirstLook)> = None;
         let mut why = PhotoError::NoTree;
         for place in Place::ALL {
             if best.as_ref().is_some_and(|(found, _)| found.is_sure()) {
                 break;
             }
-            for attempt in half.attempts(&reduced, place, colour)? {
-                let tree = match self.see(attempt) {
-                    Ok(tree) => tree,
-                    Err(PhotoError::Cancelled) => return Err(PhotoError::Cancelled),
-                    Err(e) => {
-                        why = e;
-                        continue;
-                    }
-                };
-                let found = Certainty::of(&tree.seen, tree.has_colour);
-                let known = best.as_ref().map_or(0.0, |(known, _)| known.chance());
-                if found.chance() > known {
-                    best = Some((found, tree));
+            let Some(attempt) = half.attempt(&reduced, place, self.options.leaves)? else {
+                continue;
+            };
+            let look = match self.first_look(settling.as_ref(), attempt) {
+                Ok(look) => look,
+                Err(PhotoError::Cancelled) => return Err(PhotoError::Cancelled),
+                Err(e) => {
+                    why = e;
+                    continue;
                 }
+            };
+            let found = Certainty::of(look.seen(), self.has_colour);
+            let known = best.as_ref().map_or(0.0, |(known, _)| known.chance());
+            if found.chance() > known {
+                best = Some((found, look));
             }
         }
-        let (found, tree) = best.ok_or(match why {
+        let (found, look) = best.ok_or(match why {
             PhotoError::NoTree if half.crown.is_some() => PhotoError::NoTrunk,
             PhotoError::NoTree if !half.strokes.is_empty() => PhotoError::NoCrownOn,
             why => why,
         })?;
-        let tree = match half.strokes.is_empty() {
-            true => self.again(tree)?,
-            false => tree,
+        let tree = match (look, &settling) {
+            (FirstLook::Small { attempt, seen }, Some(settling)) => {
+                self.settled(settling, attempt, *seen)?
+            }
+            (FirstLook::Small { attempt, .. }, None) => self.see(attempt)?,
+            (FirstLook::Whole(tree), _) => *tree,
         };
         let found = Some(found);
         Ok(TreeInPhoto { found, ..tree })
     }
 
-    /// The same tree, if it is bare, with the colours of its wood learned anew along the middle of what was taken
-    /// for wood until that stays (in turns, as Rother et al. 2004 sect. 3). The line that a trunk was found by
-    /// may lie on the dark side of its bark, and ends below the crown: by its colours alone wood is found with
-    /// holes, and too thin.
-    fn again(&self, mut tree: TreeInPhoto) -> Result<TreeInPhoto, PhotoError> {
-        for _ in 0..ROUNDS {
-            let way_px = tree.seen.wood.branches.longest_way_px();
-            let stays = tree
-                .strokes
-                .first()
-                .is_none_or(|line| lies_on(&way_px, line));
-            if tree.seen.in_leaf || stays {
-                break;
+    /// The tree along the strokes of an attempt; a bare one whose trunk is to settle first, in a smaller picture.
+    fn first_look(
+        &self,
+        settling: Option<&Settling>,
+        attempt: Attempt,
+    ) -> Result<FirstLook, PhotoError> {
+        let small = settling.map(|settling| settling.first_look(&attempt));
+        match small.transpose().map_err(|e| not_seen(e, self.drawn))? {
+            Some(Some(seen)) => {
+                let seen = Box::new(seen);
+                Ok(FirstLook::Small { attempt, seen })
             }
-            let attempt = Attempt {
-                crown: tree.crown.clone(),
-                strokes: vec![way_px],
-            };
-            match self.see(attempt) {
-                Ok(next) => tree = next,
-                Err(PhotoError::Cancelled) => return Err(PhotoError::Cancelled),
-                Err(_) => break,
-            }
+            _ => Ok(FirstLook::Whole(Box::new(self.see(attempt)?))),
         }
-        Ok(tree)
+    }
+
+    /// The tree along the line at which its trunk settles, or as the attempt has it if nothing is seen there.
+    fn settled(
+        &self,
+        settling: &Settling,
+        attempt: Attempt,
+        first: SeenInPhotograph,
+    ) -> Result<TreeInPhoto, PhotoError> {
+        let trunk = settling
+            .trunk(&attempt, first)
+            .map_err(|e| not_seen(e, self.drawn))?;
+        let settled = Attempt {
+            crown: attempt.crown.clone(),
+            strokes: vec![trunk],
+        };
+        match self.see(settled) {
+            Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
+            Err(_) => self.see(attempt),
+            tree => tree,
+        }
     }
 }
 
-/// Whether all corners of a line are on another one.
-fn lies_on(line: &Stroke, other: &Stroke) -> bool {
-    line.iter().all(|at| {
-        let mut pieces = other.windows(2);
-        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= STAYS_PX)
-    })
+/// An attempt that was looked at for the first time.
+enum FirstLook {
+    Whole(Box<TreeInPhoto>),
+    /// In a smaller picture.
+    Small {
+        attempt: Attempt,
+        seen: Box<SeenInPhotograph>,
+    },
+}
+
+impl FirstLook {
+    fn seen(&self) -> &SeenInPhotograph {
+        match self {
+            Self::Whole(tree) => &tree.seen,
+            Self::Small { seen, .. } => seen,
+        }
+    }
 }
 
 /// Why nothing is seen, by what was drawn: what was only found is no stroke that could be at fault.
@@ -390,6 +414,7 @@ fn closed(size: Size, tree: &[u8]) -> Result<Outline, OutlineError> {
 mod tests {
     use super::*;
     use crate::random::seed_of_part;
+    use crate::signal::distance_to_segment;
     use nalgebra::Vector2;
 
     const SIZE: Size = Size {
@@ -446,7 +471,7 @@ mod tests {
             branches_px: Vec::new(),
         };
         let options = PhotoOptions {
-            leaf_colour: None,
+            leaves: LeafHint::Unknown,
             trace_by: TraceBy::Paths,
         };
         let found = see_tree(&picture, &drawn, options, &CancelToken::new()).expect("a tree");
@@ -456,16 +481,5 @@ mod tests {
         let both = both.filter(|(is_wood, seen)| **is_wood && **seen != 0);
         let share = both.count() as f64 / all as f64;
         assert!(share > 0.95, "{share}");
-    }
-
-    fn points(line: &[[f64; 2]]) -> Stroke {
-        line.iter().map(|at| (*at).into()).collect()
-    }
-
-    #[test]
-    fn a_line_stays_if_all_its_corners_do() {
-        let line = points(&[[10.0, 90.0], [10.0, 10.0]]);
-        assert!(lies_on(&points(&[[11.0, 80.0], [9.0, 40.0]]), &line));
-        assert!(!lies_on(&points(&[[11.0, 80.0], [20.0, 10.0]]), &line));
     }
 }

@@ -2,8 +2,8 @@
 
 use super::photograph::{PhotoError, failed};
 use crate::model::{Outline, Rgb};
-use crate::outline::{self, Reduced};
-use crate::wood::{self, LeafColour, Stroke};
+use crate::outline::{self, Margin, Reduced};
+use crate::wood::{self, LeafColour, LeafHint, Stroke};
 
 /// Gaps between leaves up to this are closed, px of the reduced picture, and a crown of leaves covers so
 /// great a share of it at least.
@@ -23,12 +23,16 @@ pub struct Attempt {
 pub enum Place {
     /// What has the colour of leaves.
     InLeaf,
-    /// What stands in the picture's middle.
-    InMiddle,
+    /// What stands in the picture's middle, between margins.
+    InMiddle(Margin),
 }
 
 impl Place {
-    pub const ALL: [Self; 2] = [Self::InLeaf, Self::InMiddle];
+    pub const ALL: [Self; 3] = [
+        Self::InLeaf,
+        Self::InMiddle(Margin::Wide),
+        Self::InMiddle(Margin::Narrow),
+    ];
 }
 
 /// What was drawn of a tree: its crown or its strokes, not both.
@@ -39,43 +43,48 @@ pub struct Half {
 }
 
 impl Half {
-    /// Where the rest may be.
+    /// Where the rest may be; `None` where it is not.
     ///
     /// # Errors
     /// OpenCV fails.
-    pub fn attempts(
+    pub fn attempt(
         &self,
         reduced: &Reduced,
         place: Place,
-        colour: LeafColour,
-    ) -> Result<Vec<Attempt>, PhotoError> {
-        let mut attempts = Vec::new();
-        for crown in self.crowns(reduced, place, colour)? {
-            attempts.extend(self.attempt(reduced, &crown)?);
+        leaves: LeafHint,
+    ) -> Result<Option<Attempt>, PhotoError> {
+        match self.crown(reduced, place, leaves)? {
+            Some(crown) => self.with_trunk(reduced, &crown),
+            None => Ok(None),
         }
-        Ok(attempts)
     }
 
     /// In the reduced picture.
-    fn crowns(
+    fn crown(
         &self,
         reduced: &Reduced,
         place: Place,
-        colour: LeafColour,
-    ) -> Result<Vec<Outline>, PhotoError> {
-        let crown = match (&self.crown, place) {
-            (Some(crown), Place::InLeaf) => reduced.outline_in_reduced(crown).map_err(failed)?,
-            (Some(_), Place::InMiddle) => None,
-            (None, Place::InLeaf) => in_leaf(&reduced.picture, colour),
-            (None, Place::InMiddle) => {
-                return outline::in_middle(&reduced.picture).map_err(failed);
+        leaves: LeafHint,
+    ) -> Result<Option<Outline>, PhotoError> {
+        match (&self.crown, place) {
+            (Some(crown), Place::InLeaf) => reduced.outline_in_reduced(crown).map_err(failed),
+            (Some(_), Place::InMiddle(_)) => Ok(None),
+            (None, Place::InLeaf) => {
+                let colour = leaves.sought();
+                Ok(colour.and_then(|colour| in_leaf(&reduced.picture, colour)))
             }
-        };
-        Ok(crown.into_iter().collect())
+            (None, Place::InMiddle(margin)) => {
+                outline::in_middle(&reduced.picture, margin).map_err(failed)
+            }
+        }
     }
 
-    /// `None` where the crown stands on no trunk.
-    fn attempt(&self, reduced: &Reduced, crown: &Outline) -> Result<Option<Attempt>, PhotoError> {
+    /// A crown with its trunk; `None` where it stands on none.
+    fn with_trunk(
+        &self,
+        reduced: &Reduced,
+        crown: &Outline,
+    ) -> Result<Option<Attempt>, PhotoError> {
         let mut strokes = self.strokes.clone();
         if strokes.is_empty() {
             let Some(trunk) = outline::stem(&reduced.picture, crown) else {

@@ -62,8 +62,9 @@ impl PhotoExample {
 /// How a tree of a photograph goes on where it is not seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PhotoGrowth<'a> {
-    /// Which ready-made subtrees are used where too few branches are seen.
-    pub subtrees: SubtreeKind,
+    /// Which ready-made subtrees are used where too few branches are seen; `None`: nothing is grown, and the
+    /// tree has what is seen alone.
+    pub subtrees: Option<SubtreeKind>,
     /// A tree whose subtrees are used instead, and whose sway is that of the new tree by chance.
     pub like: Option<&'a PhotoExample>,
     /// How the visible branches come into space.
@@ -145,8 +146,12 @@ impl PhotoTree {
         }
         let seed = tree.note.config.wood.seed.into();
         let mut grown = Growth::default();
-        if in_leaf {
-            grown = grow(&mut tree, &region, growth, seed);
+        if let (true, Some(subtrees)) = (in_leaf, growth.subtrees) {
+            let library = match growth.like {
+                Some(like) => like.library.clone(),
+                None => Library::of(&tree.skeleton, subtrees),
+            };
+            grown = grow(&mut tree, &region, &library, growth.attractors, seed);
         }
         shape::set_depth_share(&mut tree.skeleton, CROWN_DEPTH);
         let sway = growth.like.map_or(Vec::new(), |like| {
@@ -208,22 +213,24 @@ impl PhotoTree {
 }
 
 /// Grows the branches that are not seen.
-fn grow(tree: &mut DrawnTree, region: &Outline, growth: PhotoGrowth, seed: u64) -> Growth {
-    let library = match growth.like {
-        Some(like) => like.library.clone(),
-        None => Library::of(&tree.skeleton, growth.subtrees),
-    };
+fn grow(
+    tree: &mut DrawnTree,
+    region: &Outline,
+    library: &Library,
+    attractors: Attracting,
+    seed: u64,
+) -> Growth {
     let silhouette = Silhouette::Filmed(tree.note.config.shape.envelope);
     let room = shape::room(&tree.skeleton, Some(region), silhouette);
     let width_px = f64::from(tree.skeleton.image_size.width);
     let region = GrowthRegion {
         tree: region,
         room: &room,
-        in_space: growth.attractors == Attracting::Space,
+        in_space: attractors == Attracting::Space,
         tip_px: shape::TIP_RADIUS_PX * width_px / 640.0,
     };
     let random = &mut generator(seed, 0);
-    grow_subtrees(&mut tree.skeleton, &library, &region, ROUNDS, random)
+    grow_subtrees(&mut tree.skeleton, library, &region, ROUNDS, random)
 }
 
 /// Whether each node lies on the trunk's line.

@@ -76,6 +76,29 @@ impl LeafColour {
     }
 }
 
+/// What is known of a tree's leaves before a photograph is looked at.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LeafHint {
+    /// There may be green ones; a tree without them is bare.
+    #[default]
+    Unknown,
+    /// There must be some of this colour.
+    Of(LeafColour),
+    /// There are none.
+    Bare,
+}
+
+impl LeafHint {
+    /// The colour of the leaves that are looked for; `None`: none are.
+    pub fn sought(self) -> Option<LeafColour> {
+        match self {
+            Self::Unknown => Some(LeafColour::default()),
+            Self::Of(colour) => Some(colour),
+            Self::Bare => None,
+        }
+    }
+}
+
 /// Share of a crown (`region`, not 0 inside) that has the colour of leaves.
 pub fn share_of(picture: &Rgb, region: &[u8], colour: LeafColour) -> f64 {
     let inside = (0..region.len()).filter(|i| region[*i] != 0);

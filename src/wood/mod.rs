@@ -37,9 +37,9 @@ mod steady;
 mod stroke_colours;
 mod ways;
 
-pub use foliage::LeafColour;
+pub use foliage::{LeafColour, LeafHint};
 pub use greenery::greenery;
-pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph};
+pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph, is_in_leaf};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;

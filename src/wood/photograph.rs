@@ -9,7 +9,7 @@
 use super::colours::colour_at;
 use super::cut::{SURE, least_cut};
 use super::drawing;
-use super::foliage::{Foliage, InCrown, LeafColour, share_of};
+use super::foliage::{Foliage, InCrown, LeafColour, LeafHint, share_of};
 use super::joined::{wide, without_specks};
 use super::mask::{self, WoodMask};
 use super::part::Part;
@@ -56,8 +56,7 @@ pub struct Photograph<'a> {
     pub crown: &'a Outline,
     /// Lines along branches, px, the trunk's first, from its foot up; one at least.
     pub strokes: &'a [Stroke],
-    /// Of the leaves that there are; `None`: there may be green ones.
-    pub leaf_colour: Option<LeafColour>,
+    pub leaves: LeafHint,
     pub trace_by: TraceBy,
 }
 
@@ -123,6 +122,61 @@ pub enum NotSeen {
     Failed(#[from] opencv::Error),
 }
 
+/// Whether the tree is in leaf.
+///
+/// # Errors
+/// `cancel` ends the work, or OpenCV fails.
+pub fn is_in_leaf(photo: Photograph, cancel: &CancelToken) -> Result<bool, NotSeen> {
+    Ok(LeavesSeen::of(photo, cancel)?.in_leaf())
+}
+
+/// The leaves of a crown, and what they were found by.
+struct LeavesSeen {
+    /// The crown stroke with the freedom that it is given.
+    within: Vec<u8>,
+    is_stroke: Vec<bool>,
+    /// 255 or 0, row by row.
+    leaves: Vec<u8>,
+    is_as_around: bool,
+}
+
+impl LeavesSeen {
+    fn of(photo: Photograph, cancel: &CancelToken) -> Result<Self, NotSeen> {
+        let size = photo.picture.size;
+        let within = widened(&photo.crown.mask, size, FREEDOM_PX)?;
+        let is_stroke = drawing::on_lines(photo.strokes, size, drawing::STROKE_PX)?;
+        let in_crown = InCrown {
+            picture: photo.picture,
+            region: &within,
+            is_bark: &is_stroke,
+        };
+        let colour = photo.leaves.sought();
+        let foliage = colour.and_then(|colour| Foliage::of(in_crown, colour, cancel));
+        if cancel.is_cancelled() {
+            return Err(NotSeen::Cancelled);
+        }
+        let mut is_as_around = false;
+        let mut leaves = match foliage {
+            Some(foliage) => {
+                is_as_around = crown::is_as_around(crown::deviations(&photo, &foliage)?);
+                foliage.mask
+            }
+            None => vec![0; size.area()],
+        };
+        crown::without_far_pieces(&mut leaves, size)?;
+        Ok(Self {
+            within,
+            is_stroke,
+            leaves,
+            is_as_around,
+        })
+    }
+
+    fn in_leaf(&self) -> bool {
+        self.leaves.iter().any(|leaf| *leaf != 0)
+    }
+}
+
 /// Finds the wood and the leaves.
 ///
 /// # Errors
@@ -131,31 +185,16 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
     let size = photo.picture.size;
     let trunk = photo.strokes.first().and_then(|trunk| trunk.first());
     let foot_px = trunk.ok_or(NotSeen::Wood)?;
-    let within = widened(&photo.crown.mask, size, FREEDOM_PX)?;
-    let colour = photo.leaf_colour.unwrap_or_default();
-    let is_stroke = drawing::on_lines(photo.strokes, size, drawing::STROKE_PX)?;
-    let in_crown = InCrown {
-        picture: photo.picture,
-        region: &within,
-        is_bark: &is_stroke,
-    };
-    let foliage = Foliage::of(in_crown, colour, cancel);
-    if cancel.is_cancelled() {
-        return Err(NotSeen::Cancelled);
-    }
-    let mut is_as_around = false;
-    let mut leaves = match foliage {
-        Some(foliage) => {
-            is_as_around = crown::is_as_around(crown::deviations(&photo, &foliage)?);
-            foliage.mask
-        }
-        None => vec![0; size.area()],
-    };
-    crown::without_far_pieces(&mut leaves, size)?;
-    let in_leaf = leaves.iter().any(|leaf| *leaf != 0);
-    if let (Some(colour), false) = (photo.leaf_colour, in_leaf) {
+    let seen = LeavesSeen::of(photo, cancel)?;
+    if let (LeafHint::Of(colour), false) = (photo.leaves, seen.in_leaf()) {
         return Err(NotSeen::LeavesOf(colour));
     }
+    let LeavesSeen {
+        within,
+        is_stroke,
+        leaves,
+        is_as_around,
+    } = seen;
     let region = with_strokes(photo.crown, &within, photo.strokes)?;
     let empty = without_wood(size, &leaves);
     let on_strokes = StrokeColours::of(photo, is_stroke, &region, &empty.is_leaf)?;
@@ -202,7 +241,7 @@ pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPh
         doubtful: on_strokes.doubtful,
         is_as_around: mask.in_leaf && is_as_around,
         level_share,
-        may_have_red_leaves: photo.leaf_colour.is_none()
+        may_have_red_leaves: photo.leaves == LeafHint::Unknown
             && share_of(photo.picture, &within, LeafColour::Red) > RED_SHARE
             && share_of(photo.picture, &within, LeafColour::Green) < GREEN_SHARE,
     })
@@ -446,7 +485,7 @@ mod tests {
             picture,
             crown: &crown,
             strokes,
-            leaf_colour: None,
+            leaves: LeafHint::Unknown,
             trace_by: TraceBy::Paths,
         };
         in_photograph(photo, &CancelToken::new())

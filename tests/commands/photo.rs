@@ -210,6 +210,14 @@ fn a_grey_photograph_of_a_bare_tree_gets_a_warning() {
     assert_eq!(count(&tree.skeleton, NodeKind::Grown), 0);
 }
 
+#[test]
+fn of_a_tree_that_is_said_to_be_bare_no_leaves_are_missed() {
+    let scene = Scene::new(DynamicImage::from(photograph(false)).to_luma8());
+    let (tree, said) = scene.tree(" --foliage bare", "tree");
+    assert!(!said.contains("no colours"), "{said}");
+    assert_eq!(count(&tree.skeleton, NodeKind::Grown), 0);
+}
+
 /// A hand never draws the same line twice.
 #[test]
 fn strokes_half_a_pixel_beside_give_nearly_the_same_tree() {

@@ -1,0 +1,140 @@
+//! The trunk of a bare tree that was found without a stroke, made sure of in a smaller picture.
+//!
+//! The line that a trunk is found by may lie on the dark side of its bark, and ends below the crown: by its
+//! colours alone wood is found with holes, and too thin. Colours are learned anew along the middle of what was
+//! taken for wood until that stays (in turns, as Rother et al. 2004 sect. 3). Where the trunk and its limbs run
+//! is seen in a small picture as well, in a quarter of the time.
+
+use super::photograph::PhotoOptions;
+use super::unaided::Attempt;
+use crate::cancel::CancelToken;
+use crate::model::Rgb;
+use crate::outline::Reduced;
+use crate::signal::distance_to_segment;
+use crate::wood::{self, NotSeen, SeenInPhotograph, Stroke};
+
+/// Width to which photographs are reduced for this, px.
+const WIDTH: u32 = 750;
+/// How often a tree is looked at again at most.
+const ROUNDS: usize = 5;
+/// Colours are not learned anew along a line that stays within this of the one before, px: it is drawn so wide.
+const STAYS_PX: f64 = 2.0;
+
+/// A photograph in which trunks settle.
+pub struct Settling<'a> {
+    reduced: Reduced,
+    options: PhotoOptions,
+    cancel: &'a CancelToken,
+}
+
+impl<'a> Settling<'a> {
+    /// # Errors
+    /// OpenCV fails.
+    pub fn of(
+        picture: &Rgb,
+        options: PhotoOptions,
+        cancel: &'a CancelToken,
+    ) -> opencv::Result<Self> {
+        Ok(Self {
+            reduced: Reduced::to_width(picture, WIDTH)?,
+            options,
+            cancel,
+        })
+    }
+
+    /// What is seen of a bare tree along the strokes of an attempt; `None` of one in leaf.
+    ///
+    /// # Errors
+    /// Nothing is seen.
+    pub fn first_look(&self, attempt: &Attempt) -> Result<Option<SeenInPhotograph>, NotSeen> {
+        let Some(small) = self.small(attempt)? else {
+            return Ok(None);
+        };
+        match wood::is_in_leaf(self.photo(&small), self.cancel)? {
+            true => Ok(None),
+            false => Ok(Some(self.look(&small)?)),
+        }
+    }
+
+    /// The line at which the trunk of an attempt settles, px of the whole picture, after what was seen `first`.
+    ///
+    /// # Errors
+    /// OpenCV fails, or the work is ended.
+    pub fn trunk(&self, attempt: &Attempt, first: SeenInPhotograph) -> Result<Stroke, NotSeen> {
+        let Some(mut small) = self.small(attempt)? else {
+            return Ok(attempt.strokes.first().cloned().unwrap_or_default());
+        };
+        let mut seen = first;
+        for _ in 0..ROUNDS {
+            let way_px = seen.wood.branches.longest_way_px();
+            let stays = small
+                .strokes
+                .first()
+                .is_none_or(|line| lies_on(&way_px, line));
+            small.strokes = vec![way_px];
+            if stays {
+                break;
+            }
+            seen = match self.look(&small) {
+                Ok(next) => next,
+                Err(NotSeen::Cancelled) => return Err(NotSeen::Cancelled),
+                Err(_) => break,
+            };
+        }
+        let way_px = small.strokes.iter().flatten();
+        Ok(way_px.map(|at| self.reduced.to_whole(*at)).collect())
+    }
+
+    /// An attempt in the small picture; `None` where nothing is left of its crown.
+    fn small(&self, attempt: &Attempt) -> opencv::Result<Option<Attempt>> {
+        let crown = self.reduced.outline_in_reduced(&attempt.crown)?;
+        let mut strokes = Vec::with_capacity(attempt.strokes.len());
+        for stroke in &attempt.strokes {
+            strokes.push(
+                stroke
+                    .iter()
+                    .map(|at| self.reduced.to_reduced(*at))
+                    .collect(),
+            );
+        }
+        Ok(crown.map(|crown| Attempt { crown, strokes }))
+    }
+
+    fn look(&self, small: &Attempt) -> Result<SeenInPhotograph, NotSeen> {
+        wood::in_photograph(self.photo(small), self.cancel)
+    }
+
+    fn photo<'b>(&'b self, small: &'b Attempt) -> wood::Photograph<'b> {
+        wood::Photograph {
+            picture: &self.reduced.picture,
+            crown: &small.crown,
+            strokes: &small.strokes,
+            leaves: self.options.leaves,
+            trace_by: self.options.trace_by,
+        }
+    }
+}
+
+/// Whether all corners of a line are on another one.
+fn lies_on(line: &Stroke, other: &Stroke) -> bool {
+    line.iter().all(|at| {
+        let mut pieces = other.windows(2);
+        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= STAYS_PX)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(line: &[[f64; 2]]) -> Stroke {
+        line.iter().map(|at| (*at).into()).collect()
+    }
+
+    #[test]
+    fn a_line_stays_if_all_its_corners_do() {
+        let line = points(&[[10.0, 90.0], [10.0, 10.0]]);
+        assert!(lies_on(&points(&[[11.0, 80.0], [9.0, 40.0]]), &line));
+        assert!(!lies_on(&points(&[[11.0, 80.0], [20.0, 10.0]]), &line));
+    }
+}
