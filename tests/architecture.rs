@@ -252,6 +252,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "shape::Drawn",
             "tui",
             "doctor",
+            // What is caught is said by a command in one line.
+            "caught::print_only_uncaught",
         ],
     ),
     ("main.rs", &["cli"]),

@@ -355,13 +355,20 @@ impl CaptureFacts {
             return None;
         }
         let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
-        // In whole seconds that add up.
         let (filmed_s, needed_s) = (self.filmed_s.round(), needed_s.ceil());
         Some(Finding {
             grade,
             reason: format!("{filmed_s:.0} of {needed_s:.0} s filmed"),
-            advice: format!("film {:.0} s more", (needed_s - filmed_s).max(1.0)),
+            advice: self.film_more(),
         })
+    }
+
+    /// What is to be filmed for branches and trunk: one number for both, in whole seconds that add up
+    /// with what is filmed.
+    fn film_more(&self) -> String {
+        let for_branches_s = self.needed_s().ceil() - self.filmed_s.round();
+        let missing_s = for_branches_s.max(self.missing_for_trunk_s().round());
+        format!("film {:.0} s more", missing_s.max(1.0))
     }
 
     fn is_unsure_of_trunk(&self) -> Option<Finding> {
@@ -377,7 +384,7 @@ impl CaptureFacts {
                 100.0 * within
             ),
             advice: match missing_s >= LENGTH_SLACK_S {
-                true => format!("film {missing_s:.0} s more"),
+                true => self.film_more(),
                 false => "pull the tree and release it".into(),
             },
         })

@@ -226,6 +226,12 @@ mod tests {
             "fair, because: the trunk's frequency is known to 6.0 % only. To do: film 18 s more",
         );
         check(
+            "too little of it for branches and trunk",
+            |f| (f.filmed_s, f.sway) = (8.0, in_wind(0.06)),
+            "fair, because: 8 of 20 s filmed; the trunk's frequency is known to 6.0 % only. To do: \
+             film 12 s more",
+        );
+        check(
             "a minute of it",
             |f| (f.filmed_s, f.sway) = (60.0, in_wind(0.08)),
             "fair, because: the trunk's frequency is known to 8.0 % only. To do: pull the tree and \

@@ -34,7 +34,7 @@ impl<'a> Settling<'a> {
         picture: &Rgb,
         options: PhotoOptions,
         cancel: &'a CancelToken,
-    ) -> opencv::Result<Self> {
+    ) -> Result<Self, NotSeen> {
         Ok(Self {
             reduced: Reduced::to_width(picture, WIDTH)?,
             options,
@@ -86,7 +86,7 @@ impl<'a> Settling<'a> {
     }
 
     /// An attempt in the small picture; `None` where nothing is left of its crown.
-    fn small(&self, attempt: &Attempt) -> opencv::Result<Option<Attempt>> {
+    fn small(&self, attempt: &Attempt) -> Result<Option<Attempt>, NotSeen> {
         let crown = self.reduced.outline_in_reduced(&attempt.crown)?;
         let mut strokes = Vec::with_capacity(attempt.strokes.len());
         for stroke in &attempt.strokes {

@@ -98,16 +98,21 @@ impl Moving for WindAnimation {
     }
 }
 
-/// Name of a force of wind on the Beaufort scale.
+/// Name of a force of wind on the Beaufort scale (World Meteorological Organization).
 fn name(force: f64) -> &'static str {
     match force.round() as u8 {
         0 => "still",
         1 => "light air",
-        2..=3 => "breeze",
-        4..=5 => "fresh breeze",
-        6..=7 => "strong wind",
-        8..=9 => "gale",
-        10..=11 => "storm",
+        2 => "light breeze",
+        3 => "gentle breeze",
+        4 => "moderate breeze",
+        5 => "fresh breeze",
+        6 => "strong breeze",
+        7 => "near gale",
+        8 => "gale",
+        9 => "strong gale",
+        10 => "storm",
+        11 => "violent storm",
         _ => "hurricane",
     }
 }

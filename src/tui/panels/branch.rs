@@ -44,7 +44,7 @@ pub fn render(frame: &mut Frame, state: &State, area: Rect, theme: Theme) {
     let mut text = told(s, answer, inner.width, theme);
     if let Some(sway) = s.sway.as_ref().filter(|_| s.sway_passed_over > 0) {
         let late = format!(
-            " as of {}, {} looks passed over",
+            " as of {}, {} left out",
             clock(sway.time_s),
             count(s.sway_passed_over)
         );

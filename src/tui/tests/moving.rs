@@ -30,7 +30,7 @@ impl Moving for Puppet {
     }
 
     fn description(&self) -> String {
-        "wind 4 of 12 (fresh breeze)  to 0°  magnified 1.00".to_owned()
+        "wind 4 of 12 (moderate breeze)  to 0°  magnified 1.00".to_owned()
     }
 }
 
