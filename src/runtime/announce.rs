@@ -117,6 +117,20 @@ impl Announced {
 }
 
 impl Announced {
+    /// The film begins anew: what was warned of because of its tree does not hold for the next one.
+    pub fn restart(&mut self, shared: &Shared) {
+        let said = std::mem::take(self);
+        let other_px = said.tree.and_then(|tree| tree.foot.other_px);
+        let of_tree = said.warned.into_iter().chain(other_px.map(two_trunks));
+        for warning in of_tree {
+            shared.withdraw(&warning);
+        }
+        let of_sight = [NO_WOOD, FOOT_CUT_OFF, FOOT_GUESSED].into_iter();
+        for warning in of_sight.chain(camera_warning(said.shown_by)) {
+            shared.withdraw(warning);
+        }
+    }
+
     /// Says how the camera itself moves, up to the frame of `tracks`.
     pub fn tell_of_camera(&mut self, tracks: &TrackSet, meter: &ShakeMeter, shared: &Shared) {
         let time_s = tracks.time_s;
@@ -201,4 +215,31 @@ fn two_trunks(other_px: Point2<i32>) -> String {
          of another tree; draw an outline around one tree (key o, or --outline FILE)",
         other_px.x, other_px.y
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_film_that_begins_anew_has_no_warning_of_the_tree_before() {
+        let shared = Shared::default();
+        let mut announced = Announced {
+            warned: Some("little motion".into()),
+            shown_by: CameraShownBy::Nothing,
+            ..Announced::default()
+        };
+        for warning in [
+            "little motion",
+            NO_WOOD,
+            FOOT_GUESSED,
+            CAMERA_UNCLEAR,
+            "the disk is slow",
+        ] {
+            shared.warn(warning.into());
+        }
+        announced.restart(&shared);
+        assert_eq!(shared.warnings(), ["the disk is slow"]);
+        assert!(announced.warned.is_none());
+    }
 }

@@ -251,7 +251,7 @@ impl ModelThread {
         self.tables_s = f64::NEG_INFINITY;
         self.new_log();
         self.quality = Quality::default();
-        self.announced = Announced::default();
+        self.announced.restart(&self.shared);
         self.picture = None;
     }
 

@@ -6,6 +6,9 @@ use crate::model::{FormatNote, PixelFormat, RawFrame, Size, nanoseconds, seconds
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
+/// What a capture has in its folder, beside pictures that are no film.
+const OF_A_CAPTURE: [&str; 2] = ["capture.json", "nodes.csv"];
+
 /// Pictures that follow each other at a fixed rate.
 pub(super) struct Images {
     folder: PathBuf,
@@ -22,6 +25,12 @@ impl Images {
             let what = format!(
                 "{rate_hz} pictures a second is no rate; give one greater than 0 with --fps"
             );
+            return Err(SourceError::BadFormat { input, what });
+        }
+        if OF_A_CAPTURE.iter().all(|name| folder.join(name).is_file()) {
+            let what = "it is a capture and not a film; `arborcam analyze` shows its sway, `arborcam animate` \
+                        its motion"
+                .to_owned();
             return Err(SourceError::BadFormat { input, what });
         }
         let entries = std::fs::read_dir(folder).map_err(|e| SourceError::of_file(folder, &e))?;
@@ -180,6 +189,16 @@ fn take_number<'a>(text: &mut &'a str) -> &'a str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_capture_is_no_film() {
+        let dir = tempfile::tempdir().expect("tempdir");
+        for name in ["capture.json", "nodes.csv", "bark.png", "leaves.png"] {
+            std::fs::write(dir.path().join(name), "").expect("write");
+        }
+        let refused = Images::open(dir.path(), 30.0).err().expect("no film");
+        assert!(refused.to_string().contains("is a capture"), "{refused}");
+    }
 
     #[test]
     fn names_are_ordered_by_their_numbers() {
