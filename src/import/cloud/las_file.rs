@@ -19,6 +19,14 @@ const HEADER_1_4: usize = 375;
 const EVLR_HEAD: u64 = 60;
 const EVLR_LENGTH_AT: u64 = 20;
 
+/// Where a header has the place of the points and their format, and the bits of that which say that
+/// they are compressed.
+const POINTS_AT: usize = 96;
+const FORMAT_AT: usize = 104;
+const COMPRESSED: u8 = 0b1100_0000;
+/// Bytes of a chunk of compressed points at least: the first of them is not compressed.
+const LEAST_CHUNK: u64 = 20;
+
 /// Reads all points. What the header says of their extent is not looked at: it is often wrong.
 ///
 /// # Errors
@@ -27,7 +35,7 @@ pub(super) fn read<R>(mut input: R, points: &mut Points) -> Result<(), ImportErr
 where
     R: BufRead + Seek + Send + Sync + 'static,
 {
-    let size = check_extended_records(&mut input).map_err(|e| ImportError::unreadable(&e))?;
+    let size = check_lengths(&mut input).map_err(|e| ImportError::unreadable(&e))?;
     // The decompressor panics on some damaged files.
     let read = caught(move || {
         let mut own = Points {
@@ -42,32 +50,60 @@ where
     read.unwrap_or_else(|| Err(ImportError::bad_format("its compressed points are damaged")))
 }
 
-/// An extended record is read at once, be it as long as it says. Returns the size of the file,
-/// bytes.
-fn check_extended_records(input: &mut (impl Read + Seek)) -> std::io::Result<u64> {
+/// What is read at once, be it as long as it says, is not longer than the file. Returns the size of
+/// that, bytes.
+fn check_lengths(input: &mut (impl Read + Seek)) -> std::io::Result<u64> {
     let end = input.seek(SeekFrom::End(0))?;
     input.seek(SeekFrom::Start(0))?;
     let mut header = Vec::new();
     input.take(HEADER_1_4 as u64).read_to_end(&mut header)?;
+    check_extended_records(input, &header, end)?;
+    check_chunks(input, &header, end)?;
+    input.seek(SeekFrom::Start(0))?;
+    Ok(end)
+}
+
+/// Memory for the table of chunks is taken for as many as it says to have.
+fn check_chunks(input: &mut (impl Read + Seek), header: &[u8], end: u64) -> std::io::Result<()> {
+    let is_compressed = header.get(FORMAT_AT).is_some_and(|f| f & COMPRESSED != 0);
+    if !is_compressed {
+        return Ok(());
+    }
+    let start = number(&header[POINTS_AT..POINTS_AT + 4]);
+    let mut table = number_at(input, start)?;
+    if table as i64 <= start as i64 {
+        // Who wrote it could not go back, and put the place at the end.
+        table = number_at(input, end.saturating_sub(8))?;
+    }
+    let chunks = number_at(input, table)? >> 32;
+    if chunks > end / LEAST_CHUNK {
+        return Err(std::io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(())
+}
+
+/// The eight bytes at a place.
+fn number_at(input: &mut (impl Read + Seek), place: u64) -> std::io::Result<u64> {
+    let mut bytes = [0; 8];
+    input.seek(SeekFrom::Start(place))?;
+    input.read_exact(&mut bytes)?;
+    Ok(number(&bytes))
+}
+
+fn check_extended_records(
+    input: &mut (impl Read + Seek),
+    header: &[u8],
+    end: u64,
+) -> std::io::Result<()> {
     let is_1_4 = header.len() == HEADER_1_4 && (header[24], header[25]) >= (1, 4);
     if is_1_4 && number(&header[EVLR_AT + 8..EVLR_AT + 12]) > 0 {
         let start = number(&header[EVLR_AT..EVLR_AT + 8]);
-        let mut length = [0; 8];
-        let cut_off = std::io::Error::from(std::io::ErrorKind::UnexpectedEof);
-        input.seek(SeekFrom::Start(
-            start.min(end).saturating_add(EVLR_LENGTH_AT),
-        ))?;
-        input.read_exact(&mut length)?;
-        if start
-            .saturating_add(EVLR_HEAD)
-            .saturating_add(number(&length))
-            > end
-        {
-            return Err(cut_off);
+        let length = number_at(input, start.min(end).saturating_add(EVLR_LENGTH_AT))?;
+        if start.saturating_add(EVLR_HEAD).saturating_add(length) > end {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
         }
     }
-    input.seek(SeekFrom::Start(0))?;
-    Ok(end)
+    Ok(())
 }
 
 /// The number in bytes, the lowest first.
