@@ -130,6 +130,7 @@ impl FrontEnd {
         self.search = AutoOutline::new(&self.config.outline);
         self.view = WholeView::new(&self.config.track);
         self.held.clear();
+        self.markers.restart();
         (self.progress, self.no_motion) = (0.0, false);
     }
 

@@ -83,6 +83,11 @@ impl MarkerStage {
         tracker.step(frame.index, frame.time_s, &picture, depths)
     }
 
+    /// The tracks begin anew, and the markers are new in them.
+    pub fn restart(&mut self) {
+        self.joined.clear();
+    }
+
     /// Adds the markers of a frame to its tracks, without the camera's motion.
     pub fn join(&mut self, markers: &[MarkerPlace], tracks: &mut TrackSet) {
         if tracks.camera.background == Background::Lost {
@@ -131,5 +136,32 @@ impl MarkerStage {
         let is_new = std::mem::take(&mut self.are_new);
         let tracker = self.tracker.as_ref().filter(|_| is_new)?;
         Some(tracker.windows())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    #[test]
+    fn a_marker_is_born_once_in_tracks_that_begin_anew() {
+        let mut stage = MarkerStage::new(&Config::default().markers);
+        assert_eq!(
+            (born_in_a_frame(&mut stage), born_in_a_frame(&mut stage)),
+            (1, 0)
+        );
+        stage.restart();
+        assert_eq!(born_in_a_frame(&mut stage), 1);
+    }
+
+    fn born_in_a_frame(stage: &mut MarkerStage) -> u32 {
+        let marker = MarkerPlace {
+            id: TrackId::of_marker(0),
+            at_px: Point2::new(20.0, 30.0),
+        };
+        let mut tracks = TrackSet::default();
+        stage.join(&[marker], &mut tracks);
+        tracks.born
     }
 }
