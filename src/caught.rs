@@ -17,14 +17,13 @@ pub fn caught<T>(call: impl FnOnce() -> T) -> Option<T> {
     done
 }
 
-/// From now on panics that are caught print nothing: what is wrong is said in one line by who caught
-/// them.
+/// From now on panics that are caught go to the log and are not printed: what is wrong is said in one
+/// line by who caught them.
 pub fn print_only_uncaught() {
     let print = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        if !catching() {
-            print(panic);
-        }
+    std::panic::set_hook(Box::new(move |panic| match catching() {
+        true => tracing::error!("{panic}"),
+        false => print(panic),
     }));
 }
 

@@ -79,7 +79,7 @@ pub fn nodes<W: Write>(
         for cell in sway::cells(&swaying.unwrap_or(Err(Unidentified::NotMeasured))) {
             table.text(&cell);
         }
-        table.text(original.map_or(node.kind.word(), |_| NodeKind::COPY));
+        table.text(node.kind_word());
         table.id(original);
         match original {
             Some(_) => table.number(node.plane_angle.to_degrees(), 4),

@@ -11,7 +11,7 @@ use super::gltf_model::raw;
 use super::joints::Moving;
 use crate::document::note::{AnimationNote, CaptureNote, Software};
 use crate::geometry::{Dressed, Foliage, FoliageGroup, LEVELS, Mesh};
-use crate::model::{NodeId, NodeKind, Pose, TREE};
+use crate::model::{NodeId, Pose, TREE};
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -309,7 +309,7 @@ fn push_joints(root: &mut Root, model: &Model) -> Result<(), ExportError> {
             "order": branches.order(id),
             "level": node.level,
             "n_tracks": node.n_tracks,
-            "kind": original.map_or(node.kind.word(), |_| NodeKind::COPY),
+            "kind": node.kind_word(),
             "certainty": node.certainty,
             "copy_of": original.map(|c| c.0),
         });

@@ -93,6 +93,16 @@ pub struct Node {
     pub moves_with: Option<NodeId>,
 }
 
+impl Node {
+    /// What files say of where it comes from: its kind in one word, or that it is a copy.
+    pub fn kind_word(&self) -> &'static str {
+        match self.copy_of {
+            Some(_) => NodeKind::COPY,
+            None => self.kind.word(),
+        }
+    }
+}
+
 #[cfg(test)]
 impl Node {
     /// A measured node for tests, with one point and of level 0.

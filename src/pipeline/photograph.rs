@@ -3,7 +3,7 @@
 //! and after every stroke by a screen.
 
 use super::certainty::Certainty;
-use super::settling::Settling;
+use super::settling::{Settling, SmallLook};
 use super::unaided::{Attempt, Half, Place};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
@@ -26,6 +26,7 @@ const COLOUR_SHARE: f64 = 0.001;
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotoOptions {
+    /// What is known of its leaves before.
     pub leaves: LeafHint,
     pub trace_by: TraceBy,
 }
@@ -250,31 +251,35 @@ impl Looked<'_> {
             PhotoError::NoTree if !half.strokes.is_empty() => PhotoError::NoCrownOn,
             why => why,
         })?;
-        let tree = match (look, &settling) {
-            (FirstLook::Small { attempt, seen }, Some(settling)) => {
-                self.settled(settling, attempt, *seen)?
-            }
-            (FirstLook::Small { attempt, .. }, None) => self.see(attempt)?,
-            (FirstLook::Whole(tree), _) => *tree,
+        let tree = match look {
+            FirstLook::Whole(tree) => *tree,
+            FirstLook::Small {
+                settling,
+                attempt,
+                look,
+            } => self.settled(settling, attempt, *look)?,
         };
         let found = Some(found);
         Ok(TreeInPhoto { found, ..tree })
     }
 
     /// The tree along the strokes of an attempt; a bare one whose trunk is to settle first, in a smaller picture.
-    fn first_look(
+    fn first_look<'s>(
         &self,
-        settling: Option<&Settling>,
+        settling: Option<&'s Settling<'s>>,
         attempt: Attempt,
-    ) -> Result<FirstLook, PhotoError> {
-        let small = settling.map(|settling| settling.first_look(&attempt));
-        match small.transpose().map_err(|e| not_seen(e, self.drawn))? {
-            Some(Some(seen)) => {
-                let seen = Box::new(seen);
-                Ok(FirstLook::Small { attempt, seen })
+    ) -> Result<FirstLook<'s>, PhotoError> {
+        if let Some(settling) = settling {
+            let look = settling.first_look(&attempt);
+            if let Some(look) = look.map_err(|e| not_seen(e, self.drawn))? {
+                return Ok(FirstLook::Small {
+                    settling,
+                    attempt,
+                    look: Box::new(look),
+                });
             }
-            _ => Ok(FirstLook::Whole(Box::new(self.see(attempt)?))),
         }
+        Ok(FirstLook::Whole(Box::new(self.see(attempt)?)))
     }
 
     /// The tree along the line at which its trunk settles, or as the attempt has it if nothing is seen there.
@@ -282,11 +287,9 @@ impl Looked<'_> {
         &self,
         settling: &Settling,
         attempt: Attempt,
-        first: SeenInPhotograph,
+        first: SmallLook,
     ) -> Result<TreeInPhoto, PhotoError> {
-        let trunk = settling
-            .trunk(&attempt, first)
-            .map_err(|e| not_seen(e, self.drawn))?;
+        let trunk = settling.trunk(first).map_err(|e| not_seen(e, self.drawn))?;
         let settled = Attempt {
             crown: attempt.crown.clone(),
             strokes: vec![trunk],
@@ -300,20 +303,21 @@ impl Looked<'_> {
 }
 
 /// An attempt that was looked at for the first time.
-enum FirstLook {
+enum FirstLook<'s> {
     Whole(Box<TreeInPhoto>),
-    /// In a smaller picture.
+    /// In a smaller picture, in which its trunk is to settle.
     Small {
+        settling: &'s Settling<'s>,
         attempt: Attempt,
-        seen: Box<SeenInPhotograph>,
+        look: Box<SmallLook>,
     },
 }
 
-impl FirstLook {
+impl FirstLook<'_> {
     fn seen(&self) -> &SeenInPhotograph {
         match self {
             Self::Whole(tree) => &tree.seen,
-            Self::Small { seen, .. } => seen,
+            Self::Small { look, .. } => &look.seen,
         }
     }
 }

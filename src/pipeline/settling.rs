@@ -46,25 +46,23 @@ impl<'a> Settling<'a> {
     ///
     /// # Errors
     /// Nothing is seen.
-    pub fn first_look(&self, attempt: &Attempt) -> Result<Option<SeenInPhotograph>, NotSeen> {
-        let Some(small) = self.small(attempt)? else {
+    pub fn first_look(&self, attempt: &Attempt) -> Result<Option<SmallLook>, NotSeen> {
+        let Some(attempt) = self.small(attempt)? else {
             return Ok(None);
         };
-        match wood::is_in_leaf(self.photo(&small), self.cancel)? {
-            true => Ok(None),
-            false => Ok(Some(self.look(&small)?)),
-        }
+        let seen = wood::in_photograph_of_bare(self.photo(&attempt), self.cancel)?;
+        Ok(seen.map(|seen| SmallLook { attempt, seen }))
     }
 
-    /// The line at which the trunk of an attempt settles, px of the whole picture, after what was seen `first`.
+    /// The line at which the trunk settles, px of the whole picture, after a first look.
     ///
     /// # Errors
-    /// OpenCV fails, or the work is ended.
-    pub fn trunk(&self, attempt: &Attempt, first: SeenInPhotograph) -> Result<Stroke, NotSeen> {
-        let Some(mut small) = self.small(attempt)? else {
-            return Ok(attempt.strokes.first().cloned().unwrap_or_default());
-        };
-        let mut seen = first;
+    /// The work is ended.
+    pub fn trunk(&self, first: SmallLook) -> Result<Stroke, NotSeen> {
+        let SmallLook {
+            attempt: mut small,
+            mut seen,
+        } = first;
         for _ in 0..ROUNDS {
             let way_px = seen.wood.branches.longest_way_px();
             let stays = small
@@ -75,7 +73,7 @@ impl<'a> Settling<'a> {
             if stays {
                 break;
             }
-            seen = match self.look(&small) {
+            seen = match wood::in_photograph(self.photo(&small), self.cancel) {
                 Ok(next) => next,
                 Err(NotSeen::Cancelled) => return Err(NotSeen::Cancelled),
                 Err(_) => break,
@@ -100,10 +98,6 @@ impl<'a> Settling<'a> {
         Ok(crown.map(|crown| Attempt { crown, strokes }))
     }
 
-    fn look(&self, small: &Attempt) -> Result<SeenInPhotograph, NotSeen> {
-        wood::in_photograph(self.photo(small), self.cancel)
-    }
-
     fn photo<'b>(&'b self, small: &'b Attempt) -> wood::Photograph<'b> {
         wood::Photograph {
             picture: &self.reduced.picture,
@@ -113,6 +107,13 @@ impl<'a> Settling<'a> {
             trace_by: self.options.trace_by,
         }
     }
+}
+
+/// What was seen of an attempt in the small picture.
+pub struct SmallLook {
+    /// In px of that picture.
+    attempt: Attempt,
+    pub seen: SeenInPhotograph,
 }
 
 /// Whether all corners of a line are on another one.

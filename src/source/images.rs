@@ -28,10 +28,10 @@ impl Images {
             return Err(SourceError::BadFormat { input, what });
         }
         if OF_A_CAPTURE.iter().all(|name| folder.join(name).is_file()) {
-            let what = "it is a capture and not a film; `arborcam analyze` shows its sway, `arborcam animate` \
-                        its motion"
-                .to_owned();
-            return Err(SourceError::BadFormat { input, what });
+            return Err(SourceError::bad_format(
+                folder,
+                "it is a capture and not a film; `arborcam analyze` shows its sway, `arborcam animate` its motion",
+            ));
         }
         let entries = std::fs::read_dir(folder).map_err(|e| SourceError::of_file(folder, &e))?;
         let mut files = Vec::new();

@@ -80,11 +80,9 @@ fn hook_panics() {
     let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         // A caught panic ends nothing, and the screen goes on.
-        if caught::catching() {
-            tracing::error!("{panic}");
-            return;
+        if !caught::catching() {
+            restore("");
         }
-        restore("");
         print(panic);
     }));
 }

@@ -60,7 +60,7 @@ impl PhotoExample {
 }
 
 /// How a tree of a photograph goes on where it is not seen.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct PhotoGrowth<'a> {
     /// Which ready-made subtrees are used where too few branches are seen; `None`: nothing is grown, and the
     /// tree has what is seen alone.

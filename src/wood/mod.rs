@@ -39,7 +39,7 @@ mod ways;
 
 pub use foliage::{LeafColour, LeafHint};
 pub use greenery::greenery;
-pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph, is_in_leaf};
+pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph, in_photograph_of_bare};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;

@@ -56,6 +56,7 @@ pub struct Photograph<'a> {
     pub crown: &'a Outline,
     /// Lines along branches, px, the trunk's first, from its foot up; one at least.
     pub strokes: &'a [Stroke],
+    /// What is known of the leaves before.
     pub leaves: LeafHint,
     pub trace_by: TraceBy,
 }
@@ -122,14 +123,6 @@ pub enum NotSeen {
     Failed(#[from] opencv::Error),
 }
 
-/// Whether the tree is in leaf.
-///
-/// # Errors
-/// `cancel` ends the work, or OpenCV fails.
-pub fn is_in_leaf(photo: Photograph, cancel: &CancelToken) -> Result<bool, NotSeen> {
-    Ok(LeavesSeen::of(photo, cancel)?.in_leaf())
-}
-
 /// The leaves of a crown, and what they were found by.
 struct LeavesSeen {
     /// The crown stroke with the freedom that it is given.
@@ -182,10 +175,34 @@ impl LeavesSeen {
 /// # Errors
 /// The strokes are not on a tree, `cancel` ends the work, or OpenCV fails.
 pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPhotograph, NotSeen> {
+    let leaves = LeavesSeen::of(photo, cancel)?;
+    with_wood(photo, leaves, cancel)
+}
+
+/// The same of a bare tree; `None`, without a look at its wood, of one in leaf.
+///
+/// # Errors
+/// As of [`in_photograph`].
+pub fn in_photograph_of_bare(
+    photo: Photograph,
+    cancel: &CancelToken,
+) -> Result<Option<SeenInPhotograph>, NotSeen> {
+    let leaves = LeavesSeen::of(photo, cancel)?;
+    match leaves.in_leaf() {
+        true => Ok(None),
+        false => with_wood(photo, leaves, cancel).map(Some),
+    }
+}
+
+/// The wood beside the leaves.
+fn with_wood(
+    photo: Photograph,
+    seen: LeavesSeen,
+    cancel: &CancelToken,
+) -> Result<SeenInPhotograph, NotSeen> {
     let size = photo.picture.size;
     let trunk = photo.strokes.first().and_then(|trunk| trunk.first());
     let foot_px = trunk.ok_or(NotSeen::Wood)?;
-    let seen = LeavesSeen::of(photo, cancel)?;
     if let (LeafHint::Of(colour), false) = (photo.leaves, seen.in_leaf()) {
         return Err(NotSeen::LeavesOf(colour));
     }
