@@ -3,15 +3,18 @@
 use super::error::DocumentError;
 use super::table::{TableReader, TableWriter};
 use crate::files::WriteError;
-use crate::model::{BranchGraph, FARTHEST_PX, Wood, WoodNode, WoodSeen};
+use crate::model::{FARTHEST_PX, Wood, WoodNode, WoodSeen};
 use nalgebra::Point2;
 use std::path::Path;
 use std::sync::Arc;
 
 /// The name of the file.
 pub const WOOD_FILE: &str = "wood.csv";
-const HEADER: &str = "frame,parent,u_px,v_px,radius_px";
+const HEADER: &str = "frame,parent,u_px,v_px,radius_px,bare";
 const COLUMNS: [&str; 5] = ["frame", "parent", "u_px", "v_px", "radius_px"];
+
+/// What the last column says of bare wood.
+const BARE: &str = "true";
 
 /// The table as bytes: a row for each node of the wood that was found in a frame, which names its
 /// parent by the number of that one's row. Numbers have all their digits.
@@ -30,27 +33,31 @@ pub fn wood_csv(seen: &WoodSeen) -> Result<Vec<u8>, WriteError> {
             for number in [node.position_px.x, node.position_px.y, node.radius_px] {
                 table.text(&number.to_string());
             }
+            table.text(if wood.bare { BARE } else { "false" });
             table.end_row()?;
         }
     }
     table.finish()
 }
 
-/// Reads the table in `dir`: the branches alone.
+/// Reads the table in `dir`: the branches, and whether they are bare.
 ///
 /// # Errors
 /// It is missing or damaged, or a row's parent does not stand before it.
 pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
     let mut table = TableReader::open(dir, WOOD_FILE, COLUMNS)?;
-    let mut graphs = std::collections::BTreeMap::<u64, BranchGraph>::new();
+    let bare = table.optional("bare");
+    let mut seen = std::collections::BTreeMap::<u64, Wood>::new();
     while table.next()? {
-        let wood = graphs.entry(table.whole(0, "frame")?).or_default();
+        let wood = seen.entry(table.whole(0, "frame")?).or_default();
+        wood.bare = table.optional_cell(bare) == BARE;
+        let branches = &mut wood.branches;
         let parent = match table.cell(1) {
             "" => None,
             _ => Some(table.whole::<usize>(1, "parent")?),
         };
-        let is_root = wood.nodes.is_empty();
-        if parent.is_none() != is_root || parent.is_some_and(|p| p >= wood.nodes.len()) {
+        let is_root = branches.nodes.is_empty();
+        if parent.is_none() != is_root || parent.is_some_and(|p| p >= branches.nodes.len()) {
             return Err(table.bad("parent must be the number of a row before it"));
         }
         let node = WoodNode {
@@ -62,22 +69,16 @@ pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
         if is_far || !(0.0..=FARTHEST_PX).contains(&node.radius_px) {
             return Err(table.bad("no tree is so large"));
         }
-        wood.nodes.push(node);
+        branches.nodes.push(node);
     }
-    let mut seen = WoodSeen::new();
-    for (frame, branches) in graphs {
-        let wood = Wood {
-            branches,
-            ..Wood::default()
-        };
-        seen.insert(frame, Arc::new(wood));
-    }
-    Ok(seen)
+    let shared = |(frame, wood)| (frame, Arc::new(wood));
+    Ok(seen.into_iter().map(shared).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::BranchGraph;
 
     fn read(text: &[u8]) -> Result<WoodSeen, DocumentError> {
         let dir = tempfile::tempdir().expect("a folder");
@@ -87,21 +88,29 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read() {
-        let of = |nodes| {
+        let of = |bare, nodes| {
             Arc::new(Wood {
                 branches: BranchGraph { nodes },
+                bare,
                 ..Wood::default()
             })
         };
-        let wood = of(vec![
+        let nodes = vec![
             WoodNode::made_up(None, 100.0, 200.5),
             WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
             WoodNode::made_up(Some(0), 90.0, 120.0),
-        ]);
-        let later = of(vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)]);
+        ];
+        let later = vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)];
+        let (wood, later) = (of(false, nodes), of(true, later));
         let seen = WoodSeen::from([(90, wood), (170, later)]);
         let text = wood_csv(&seen).expect("a table");
         assert_eq!(read(&text).expect("wood"), seen);
+    }
+
+    #[test]
+    fn a_table_that_does_not_say_so_is_not_of_bare_wood() {
+        let seen = read(b"frame,parent,u_px,v_px,radius_px\n7,,1,2,3\n").expect("wood");
+        assert!(!seen[&7].bare);
     }
 
     #[test]

@@ -164,6 +164,14 @@ impl Skeleton {
             .count()
     }
 
+    /// The measured nodes alone.
+    pub fn without_copies(&self) -> Self {
+        Self {
+            nodes: self.nodes[..self.measured()].to_vec(),
+            ..self.clone()
+        }
+    }
+
     /// The highest level of a node.
     pub fn deepest_level(&self) -> u8 {
         self.nodes.iter().map(|n| n.level).max().unwrap_or(0)

@@ -10,6 +10,8 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wood {
     pub branches: BranchGraph,
+    /// No leaves are seen on it.
+    pub bare: bool,
     /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
     /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
     pub bark: Option<Arc<Rgb>>,

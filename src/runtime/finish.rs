@@ -242,6 +242,7 @@ fn note_of(job: &CaptureJob, done: &Done) -> CaptureNote {
         ..ModelNote::of(&tree.skeleton, job.config.export.metres_per_px)
     };
     let mut note = describe(job, Some(tree), Some(model));
+    note.config.shape.planes = tree.planes(&job.config);
     note.quality.median_reprojection_px = done.misses.median();
     note
 }

@@ -202,7 +202,11 @@ impl Model {
     }
 
     fn joined_parts(&mut self, before: &Skeleton, config: &Config) -> Skeleton {
-        let mut straight = sub_branches::with(&self.plain, &self.sub_branches);
+        let plain = match self.planes(config) {
+            1 => Arc::new(self.plain.without_copies()),
+            _ => self.plain.clone(),
+        };
+        let mut straight = sub_branches::with(&plain, &self.sub_branches);
         let none_seen = BranchGraph::default();
         let branches = match &self.wood {
             Some(wood) => &wood.branches,
@@ -220,7 +224,7 @@ impl Model {
             next: self.names,
             prior: Some(before),
         };
-        let mut joined = along_wood(&self.plain, &straight, branches, &points, &mut names);
+        let mut joined = along_wood(&plain, &straight, branches, &points, &mut names);
         self.names = names.next;
         self.set_depths_seen(&mut joined.skeleton);
         assign_radii(&mut joined.skeleton, &self.outline_at_rest, config);
@@ -230,6 +234,16 @@ impl Model {
             taper(&mut joined.skeleton.nodes, &joined.seen_px);
         }
         joined.skeleton
+    }
+
+    /// Planes about the trunk that carry branches: of a tree that is seen to be bare all branches are
+    /// seen, and copies of them would be branches that it does not have.
+    pub fn planes(&self, config: &Config) -> u32 {
+        let is_bare = self.wood.as_ref().is_some_and(|wood| wood.bare);
+        match is_bare && !config.shape.copy_bare {
+            true => 1,
+            false => config.shape.planes,
+        }
     }
 
     /// Gives each branch of `skeleton` the number of points that are on it or on what it carries:

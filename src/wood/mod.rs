@@ -172,6 +172,7 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     };
     Ok(Some(Wood {
         branches,
+        bare: !mask.in_leaf,
         bark: bark.map(Arc::new),
         at_rest: Some(Arc::new(at_rest)),
     }))

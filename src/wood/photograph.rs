@@ -249,6 +249,7 @@ fn with_wood(
     Ok(SeenInPhotograph {
         wood: Wood {
             branches,
+            bare: !mask.in_leaf,
             bark: bark.map(Arc::new),
             at_rest: Some(Arc::new(at_rest)),
         },

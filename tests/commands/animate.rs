@@ -131,6 +131,8 @@ fn the_model_holds_the_motion_and_its_loop_closes() {
             "--leaves",
             "on",
             "--leaf-swing",
+            "--planes",
+            "3",
         ],
     );
     let (document, buffers, _) = gltf::import(&out).expect("a model");

@@ -66,6 +66,7 @@ impl PhotoSession for Puppet {
         ];
         Some(Ok(FoundTree {
             wood: Wood {
+                bare: true,
                 branches: BranchGraph { nodes },
                 bark: None,
                 at_rest: Some(Arc::new(AtRest::made_up(SIZE))),
