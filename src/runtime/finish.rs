@@ -2,7 +2,7 @@
 
 use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
-use super::judge::judge;
+use super::judge::{FilmLength, judge};
 use super::meter::Histogram;
 use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
@@ -20,8 +20,8 @@ use crate::document::{
 use crate::dynamics::Take;
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Background, Origin, Outline, Picture, Pose, Rgb, Skeleton, TagScale, Tentative, Timing,
-    TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
+    AtRest, Background, CameraState, Origin, Outline, Picture, Pose, Rgb, Skeleton, TagScale,
+    Tentative, Timing, TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -47,9 +47,34 @@ pub struct Quality {
     fb_error_px: Histogram,
     error_px: Histogram,
     shaking: ShakeMeter,
+    away_before: Absences,
+}
+
+/// How often, and how long in all, the camera was away.
+#[derive(Clone, Copy, Debug, Default)]
+struct Absences {
+    count: u64,
+    seconds: f64,
+}
+
+impl Absences {
+    fn of(camera: &CameraState) -> Self {
+        Self {
+            count: camera.reconnects,
+            seconds: camera.away_s,
+        }
+    }
 }
 
 impl Quality {
+    /// For points that are followed from now on: what `camera` was away before is not theirs.
+    pub fn from_now(camera: &CameraState) -> Self {
+        Self {
+            away_before: Absences::of(camera),
+            ..Self::default()
+        }
+    }
+
     /// Takes the tracks of a frame and the medians of their forward-backward and of their expected
     /// error, px.
     pub fn note(&mut self, tracks: &TrackSet, fb_error_px: f64, error_px: Option<f64>) {
@@ -110,6 +135,19 @@ impl Quality {
     /// Time of the last one, s since the first of the film.
     pub fn last_s(&self) -> f64 {
         self.last_s
+    }
+
+    /// The film in which points were followed, where `camera` says how often the camera was away by now.
+    pub fn length(&self, camera: &CameraState) -> FilmLength {
+        let away = Absences::of(camera);
+        let seconds = self.followed_s() - (away.seconds - self.away_before.seconds);
+        let absences = away.count.saturating_sub(self.away_before.count);
+        // Each absence is one of the steps from frame to frame.
+        let steps = self.frames.saturating_sub(1 + absences);
+        FilmLength {
+            seconds: seconds.max(0.0),
+            rate_hz: (steps > 0 && seconds > 0.0).then(|| steps as f64 / seconds),
+        }
     }
 
     /// Points that were still followed in it.
@@ -448,7 +486,7 @@ fn count(counter: &AtomicU64) -> u64 {
 }
 
 /// The frames of a capture in time.
-pub(super) fn timing(job: &CaptureJob) -> Timing {
+fn timing(job: &CaptureJob) -> Timing {
     let counts = &job.shared.counts;
     let (seen, duration_s) = (count(&counts.seen), job.shared.last_time_s());
     let camera = job.shared.camera_state();

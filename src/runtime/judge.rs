@@ -1,6 +1,6 @@
 //! What a capture is judged by: the facts of one that is at its end, or goes on.
 
-use super::finish::{CaptureJob, Quality, timing};
+use super::finish::{CaptureJob, Quality};
 use super::shaking::CameraShownBy;
 use crate::config::Dynamics;
 use crate::dynamics::Take;
@@ -31,7 +31,7 @@ pub struct JudgedFilm<'a> {
     pub cut: Option<FilmCut>,
 }
 
-/// How long it is.
+/// How long the film is in which points were followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FilmLength {
     /// Without the time in which the camera was away, s.
@@ -73,13 +73,9 @@ impl JudgedFilm<'_> {
 /// What a capture is worth whose tree is `tree`, with its sway where that was analysed, which is
 /// that of `take`.
 pub fn judge(job: &CaptureJob, tree: Option<&Model>, take: &Take) -> Judgement {
-    let timing = timing(job);
     let film = JudgedFilm {
         is_filming: false,
-        length: FilmLength {
-            seconds: timing.duration_s - timing.away_s,
-            rate_hz: timing.measured_rate_hz,
-        },
+        length: job.quality.length(&job.shared.camera_state()),
         quality: &job.quality,
         log: &job.log,
         settings: &job.config.dynamics,

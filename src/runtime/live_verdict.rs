@@ -1,7 +1,7 @@
 //! What the capture would be worth if it ended now, once a second of film.
 
 use super::finish::Quality;
-use super::judge::{FilmLength, JudgedFilm, mean_grey};
+use super::judge::{JudgedFilm, mean_grey};
 use crate::config::Dynamics;
 use crate::model::{CameraState, Judgement, Picture, SwayFacts, SwayNow, Unidentified, Verdict};
 use crate::pipeline::BackEnd;
@@ -59,7 +59,7 @@ impl LiveVerdict {
         self.had_tree = model.is_some();
         let film = JudgedFilm {
             is_filming: true,
-            length: length_so_far(quality, camera),
+            length: quality.length(camera),
             quality,
             log: back.log(),
             settings,
@@ -106,16 +106,6 @@ impl LiveVerdict {
     /// Forgets tracks and tree.
     pub fn restart(&mut self) {
         *self = Self::default();
-    }
-}
-
-/// The film so far, by the frames that were worked off.
-fn length_so_far(quality: &Quality, camera: &CameraState) -> FilmLength {
-    let steps = quality.frames().saturating_sub(1 + camera.reconnects);
-    let followed_s = quality.followed_s() - camera.away_s;
-    FilmLength {
-        seconds: quality.last_s() - camera.away_s,
-        rate_hz: (steps > 0 && followed_s > 0.0).then(|| steps as f64 / followed_s),
     }
 }
 

@@ -300,6 +300,9 @@ impl ModelThread {
         self.keep();
         self.write_tables(moved.tracks.time_s);
         let tracks = &moved.tracks;
+        if self.quality.frames() == 0 {
+            self.quality = Quality::from_now(&self.shared.camera_state());
+        }
         self.quality
             .note(tracks, median_fb_error_px(tracks), median_error_px(tracks));
         self.announced
