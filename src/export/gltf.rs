@@ -5,13 +5,14 @@ use super::ExportError;
 use super::gltf_animation::push_animation;
 use super::gltf_buffer::BufferBuilder;
 use super::gltf_check::check;
-use super::gltf_look::{LeafPicture, bark, leaf};
+use super::gltf_look::{LeafPicture, MADE_UP_BARK, bark, leaf};
 use super::gltf_mesh::{MeshPart, push_skin, push_skinned};
 use super::gltf_model::raw;
 use super::joints::Moving;
 use crate::document::note::{AnimationNote, CaptureNote, Software};
 use crate::geometry::{Dressed, Foliage, FoliageGroup, LEVELS, Mesh};
 use crate::model::{NodeId, Pose, TREE};
+use gltf_json::material::Material;
 use gltf_json::{Asset, Index, Node, Root, Scene, Skin};
 use serde_json::{Value, json};
 use std::borrow::Cow;
@@ -241,10 +242,23 @@ fn push_wood(
     let Some(mesh) = look.wood else {
         return Ok(Vec::new());
     };
-    let material = bark(root, buffer, &model.dressed.bark)?;
-    let material = root.push(material);
-    let what = MeshPart::wood(mesh, material, skin);
-    Ok(vec![push_skinned(root, buffer, model.scale(), what)?])
+    let bark = bark(root, buffer, &model.dressed.bark)?;
+    let material = root.push(bark.clone());
+    let (seen, made_up) = (mesh.part(false), mesh.part(true));
+    if !is_drawn(&seen) || !is_drawn(&made_up) {
+        let what = MeshPart::wood(mesh, material, skin);
+        return Ok(vec![push_skinned(root, buffer, model.scale(), &[what])?]);
+    }
+    // It looks the same; with a material of its own it can be hidden.
+    let of_made_up = root.push(Material {
+        name: Some(MADE_UP_BARK.to_owned()),
+        ..bark
+    });
+    let parts = [
+        MeshPart::wood(&seen, material, skin),
+        MeshPart::wood(&made_up, of_made_up, skin),
+    ];
+    Ok(vec![push_skinned(root, buffer, model.scale(), &parts)?])
 }
 
 fn push_leaves(
@@ -274,7 +288,7 @@ fn push_leaves(
         } else {
             MeshPart::leaves(group, material, skin)
         };
-        let node = push_skinned(root, buffer, model.scale(), what)?;
+        let node = push_skinned(root, buffer, model.scale(), &[what])?;
         drawn.meshes.push(node);
         drawn.swinging.extend(look.swings.then_some((k, node)));
     }

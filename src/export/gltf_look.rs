@@ -25,6 +25,9 @@ pub(super) fn linear(channel: u8) -> f32 {
     }
 }
 
+/// The material of wood that nobody has seen.
+pub(super) const MADE_UP_BARK: &str = "bark_made_up";
+
 /// One colour (sRGB), or the filmed bark, a tile that is repeated. `extras` say where it comes from.
 ///
 /// # Errors

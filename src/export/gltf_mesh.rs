@@ -103,20 +103,21 @@ impl<'a> MeshPart<'a> {
     }
 }
 
-/// Adds the mesh and the node that shows it.
+/// Adds a mesh of these parts, and the node that shows it, which is called as the first.
 pub(super) fn push_skinned(
     root: &mut Root,
     buffer: &mut BufferBuilder,
     scale: f64,
-    what: MeshPart,
+    parts: &[MeshPart],
 ) -> Result<Index<Node>, ExportError> {
-    let mesh = mesh_of(root, buffer, scale, std::slice::from_ref(&what))?;
+    let mesh = mesh_of(root, buffer, scale, parts)?;
     let mesh = root.push(mesh);
-    let extras = raw(&what.extras)?;
+    let first = parts.first();
+    let extras = raw(first.map_or(&Value::Null, |part| &part.extras))?;
     Ok(root.push(Node {
         mesh: Some(mesh),
-        skin: what.skin,
-        name: Some(what.name),
+        skin: first.and_then(|part| part.skin),
+        name: first.map(|part| part.name.clone()),
         extras,
         ..Node::default()
     }))

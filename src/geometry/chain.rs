@@ -18,6 +18,7 @@ pub(super) struct Link<'a> {
     /// Rings that it needs at density 1.
     need: f64,
     is_twig: bool,
+    pub made_up: bool,
 }
 
 /// From the base of a limb over those that it goes on in to a tip.
@@ -201,5 +202,6 @@ fn link(limb: &Limb) -> Link<'_> {
         samples: s,
         need,
         is_twig: limb.twig,
+        made_up: limb.made_up,
     }
 }

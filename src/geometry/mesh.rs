@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// farthest coordinate, has no direction that single precision could tell.
 const THINNEST: f64 = 32.0 * f32::EPSILON as f64;
 
-/// Triangles with skinning weights; all vectors but `indices` have one entry a vertex.
+/// Triangles with skinning weights; all vectors but `indices` and `made_up` have one entry a vertex.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Model axes at rest, px.
@@ -21,9 +21,45 @@ pub struct Mesh {
     pub weights: Vec<[f32; 4]>,
     /// Three a triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
+    /// Which triangles are of wood that nobody has seen; empty where that is not known.
+    pub made_up: Vec<bool>,
 }
 
 impl Mesh {
+    /// The triangles since those that are marked are all [made up](Self::made_up), or none.
+    pub(super) fn mark_new(&mut self, made_up: bool) {
+        self.made_up.resize(self.indices.len() / 3, made_up);
+    }
+
+    /// The triangles that are made up, or the others, with their vertices alone.
+    pub fn part(&self, made_up: bool) -> Self {
+        let mut part = Self::default();
+        let mut place_of: Vec<Option<u32>> = vec![None; self.positions.len()];
+        for (k, corners) in self.indices.chunks_exact(3).enumerate() {
+            if self.made_up.get(k).copied().unwrap_or(false) != made_up {
+                continue;
+            }
+            for &corner in corners {
+                let place = *place_of[corner as usize]
+                    .get_or_insert_with(|| part.push_vertex(self, corner as usize));
+                part.indices.push(place);
+            }
+            part.made_up.push(made_up);
+        }
+        part
+    }
+
+    /// Adds a vertex of another mesh, and returns its place.
+    fn push_vertex(&mut self, other: &Self, vertex: usize) -> u32 {
+        let place = self.positions.len() as u32;
+        self.positions.push(other.positions[vertex]);
+        self.normals.extend(other.normals.get(vertex));
+        self.uvs.extend(other.uvs.get(vertex));
+        self.joints.extend(other.joints.get(vertex));
+        self.weights.extend(other.weights.get(vertex));
+        place
+    }
+
     /// How many corners of triangles have a normal that points against the winding of the triangle:
     /// whoever sees the triangle from its front is shown a lit back. Triangles too thin to have a
     /// direction and corners that are not there do not count.
@@ -112,6 +148,29 @@ mod tests {
             ..Mesh::default()
         };
         assert_eq!(mesh.pieces(), [0, 0, 1, 0, 0, 2, 2, 2]);
+    }
+
+    #[test]
+    fn a_part_has_its_triangles_and_no_other_vertices() {
+        let mesh = Mesh {
+            positions: (0..5).map(|i| [i as f32, 0.0, 0.0]).collect(),
+            uvs: (0..5).map(|i| [0.0, i as f32]).collect(),
+            indices: vec![0, 1, 2, 2, 1, 4],
+            made_up: vec![false, true],
+            ..Mesh::default()
+        };
+        let (seen, made_up) = (mesh.part(false), mesh.part(true));
+        assert_eq!(
+            (&seen.indices[..], seen.positions.len()),
+            (&[0, 1, 2][..], 3)
+        );
+        assert_eq!(made_up.indices, [0, 1, 2]);
+        assert_eq!(made_up.uvs, [[0.0, 2.0], [0.0, 1.0], [0.0, 4.0]]);
+        let unknown = Mesh {
+            made_up: Vec::new(),
+            ..mesh
+        };
+        assert!(unknown.part(true).indices.is_empty());
     }
 
     #[test]

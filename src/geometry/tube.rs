@@ -21,6 +21,8 @@ struct Ring {
     sample: CenterlineSample,
     tangent: Vector3<f64>,
     sides: usize,
+    /// The wood below it.
+    made_up: bool,
 }
 
 /// Triangles that [`append`] makes of the chain.
@@ -100,6 +102,7 @@ pub(super) fn append(chain: &Chain, density: f64, mesh: &mut Mesh) {
             Some(below) => join(mesh, below, start),
             None => {}
         }
+        mesh.mark_new(ring.made_up);
         below = Some(start);
     }
 }
@@ -195,6 +198,7 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
                     tangent,
                     sides,
                     sample,
+                    made_up: link.made_up,
                 });
                 continue;
             };
@@ -213,6 +217,7 @@ fn rings(chain: &Chain, density: f64) -> Vec<Ring> {
                     tangent: turn.powf(share) * tangent,
                     sides,
                     sample,
+                    made_up: link.made_up,
                 });
             }
         }

@@ -101,6 +101,11 @@ impl Node {
             None => self.kind.word(),
         }
     }
+
+    /// Whether nobody has seen it: a copy of a branch, or one that a generator made up.
+    pub fn is_made_up(&self) -> bool {
+        self.copy_of.is_some() || self.kind == NodeKind::Grown
+    }
 }
 
 #[cfg(test)]

@@ -99,6 +99,7 @@ pub(super) fn branches(skeleton: &Skeleton, curl: f64, seed: u64) -> Vec<Grown> 
                 node: own,
                 parent: grows_from,
                 twig: false,
+                made_up: node.is_made_up(),
                 samples: centerline(&curve, parent, own, pieces),
             },
             at: 1.0,

@@ -23,6 +23,8 @@ pub struct Limb {
     pub parent: Option<usize>,
     /// Added by self-similarity; not a branch of the skeleton.
     pub twig: bool,
+    /// Nobody has seen it: a twig, or a branch that is [made up](crate::model::Node::is_made_up).
+    pub made_up: bool,
     /// From its base to its tip, at least two; the first is on the parent's middle line.
     pub samples: Vec<CenterlineSample>,
 }

@@ -274,6 +274,7 @@ impl Maker<'_> {
                     node: stem.node,
                     parent: Some(parent),
                     twig: true,
+                    made_up: true,
                     samples: centerline(&curve, stem.skin),
                 },
                 at,

@@ -146,6 +146,7 @@ fn leaf(skeleton: &Skeleton, node: usize, half: f32) -> Foliage {
         joints: vec![[n, 0, 0, 0]; 4],
         weights: vec![[1.0, 0.0, 0.0, 0.0]; 4],
         indices: vec![0, 1, 2, 0, 2, 3],
+        made_up: Vec::new(),
     };
     let group = FoliageGroup {
         node: NodeId(node as u32),

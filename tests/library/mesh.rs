@@ -309,6 +309,7 @@ fn limbs_from_anywhere_are_drawn_or_left_out() {
         node: NodeId(1),
         parent,
         twig: false,
+        made_up: false,
         samples,
     };
     let limbs = [
@@ -323,6 +324,29 @@ fn limbs_from_anywhere_are_drawn_or_left_out() {
     let mesh = wood(&limbs, 500);
     check(&mesh, &synthetic::tree(1, 1));
     assert!(triangles(&mesh) > 400, "two of them can be drawn");
+}
+
+/// Twigs and copies have nothing of what was filmed, nor that of them.
+#[test]
+fn wood_that_nobody_has_seen_is_marked() {
+    let skeleton = synthetic::tree(3, 3);
+    let limbs = synthetic::limbs_of(&skeleton, &Wood::default());
+    let mesh = wood(&limbs, 30_000);
+    let (seen, made_up) = (mesh.part(false), mesh.part(true));
+    assert_eq!(triangles(&mesh), mesh.made_up.len());
+    assert_eq!(triangles(&seen) + triangles(&made_up), triangles(&mesh));
+    let filmed = limbs.iter().filter(|limb| !limb.made_up);
+    let filmed: Vec<usize> = filmed.map(|limb| limb.node.index()).collect();
+    let measured: Vec<usize> = (1..skeleton.measured()).collect();
+    assert_eq!(filmed, measured);
+    for joints in &seen.joints {
+        let first = usize::from(joints[0]);
+        assert!(first < skeleton.measured(), "a copy moves what was filmed");
+    }
+    assert!(
+        triangles(&made_up) > triangles(&seen),
+        "two copies of all, and twigs"
+    );
 }
 
 proptest! {

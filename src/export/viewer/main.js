@@ -55,9 +55,14 @@ function offerDownload(bytes, title) {
 }
 
 function partButtons(stage, tree, skeleton, film, { views, look, atFilm }) {
+  const shown = { mesh: true, madeUp: true };
+  const showWood = () => {
+    for (const mesh of tree.wood) mesh.visible = shown.mesh && (shown.madeUp || !tree.madeUp.includes(mesh));
+  };
   const show = {
     skeleton: (on) => skeleton.show(on),
-    mesh: (on) => tree.wood.forEach((m) => (m.visible = on)),
+    mesh: (on) => (shown.mesh = on),
+    made_up: (on) => (shown.madeUp = on),
     leaves: (on) => tree.leaves.forEach((m) => (m.visible = on)),
     film: (on) => {
       film.on = on;
@@ -71,12 +76,14 @@ function partButtons(stage, tree, skeleton, film, { views, look, atFilm }) {
   const there = {
     skeleton: !(tree instanceof Forest),
     mesh: tree.wood.length > 0,
+    made_up: tree.madeUp.length > 0,
     leaves: tree.leaves.length > 0,
     film: film !== null,
   };
   const why = {
     skeleton: "A forest has no skeleton here",
     mesh: "This model has no mesh",
+    made_up: tree instanceof Forest ? "A forest does not say what was seen" : "Either all of this wood was seen, or none",
     leaves: "This model has no leaves",
     film: "This capture has no picture",
   };
@@ -87,6 +94,7 @@ function partButtons(stage, tree, skeleton, film, { views, look, atFilm }) {
         if (button.disabled) return;
         press(button, !pressed(button));
         show[part](pressed(button));
+        showWood();
         stage.ask();
       };
       if (!there[part]) {
@@ -177,7 +185,7 @@ async function open() {
     {
       " ": () => player.toggle(), "[": () => player.step(-1), "]": () => player.step(1),
       1: () => views.show("front"), 2: () => views.show("side"), 3: () => views.show("top"),
-      s: parts.skeleton, m: parts.mesh, l: parts.leaves, f: parts.film,
+      s: parts.skeleton, m: parts.mesh, u: parts.made_up, l: parts.leaves, f: parts.film,
       c: () => {
         colour.selectedIndex = (colour.selectedIndex + 1) % colour.options.length;
         recolour();

@@ -15,6 +15,8 @@ export class Tree {
     this.root.add(gltf.scene);
     this.joints = new Map();
     this.wood = [];
+    // Of the wood, what nobody has seen: twigs, copies, grown branches.
+    this.madeUp = [];
     this.leaves = [];
     this.ground = [];
     gltf.scene.traverse((object) => {
@@ -25,6 +27,7 @@ export class Tree {
       object.frustumCulled = false;
       const kinds = { leaf: this.leaves, ground: this.ground };
       (kinds[object.material.name] ?? this.wood).push(object);
+      if (object.material.name === "bark_made_up") this.madeUp.push(object);
     });
     this.branches = [];
     for (const branch of data.branches) {

@@ -143,6 +143,7 @@ mod tests {
             node: NodeId(k as u32),
             parent,
             twig: false,
+            made_up: false,
             samples: samples.into(),
         }
     }
