@@ -4,36 +4,62 @@
 use crate::model::{Node, NodeId};
 use crate::shape::TIP_RADIUS_PX;
 
-/// A stretch of an axis with one radius.
+/// Radii go with the length of wood that a branch bears to this power: the pipe model with da Vinci's
+/// exponent of 2.5, as for wood that is not seen.
+const PIPE_POWER: f64 = 1.0 / 2.5;
+/// So much thicker than the pipe model has it, with the constant of this tree, a branch may be. Where
+/// branches lie side by side, the picture shows them as one that is thicker.
+const WITHIN_PIPES: f64 = 1.3;
+/// Wood that a tip bears besides what is drawn, px.
+const TIP_BORNE_PX: f64 = 3.0;
+
+/// A radius that is seen along some length of wood.
 #[derive(Clone, Copy, Debug)]
-struct Stretch {
+struct Measure {
     radius_px: f64,
     length_px: f64,
-    nodes: usize,
+}
+
+/// A stretch of an axis with one radius: the median of what is seen along it.
+#[derive(Clone, Debug)]
+struct Stretch {
+    radius_px: f64,
+    /// One a node.
+    measures: Vec<Measure>,
+}
+
+impl Stretch {
+    fn of(measures: Vec<Measure>) -> Self {
+        Self {
+            radius_px: weighted_median(measures.clone()),
+            measures,
+        }
+    }
 }
 
 /// Sets the radii from those that are seen, px, by node. Along an axis from its fork to its tip
 /// they are the best that do not grow (isotonic regression by pooling adjacent violators, Ayer et
-/// al. 1955, weighted by length): where a line of wood begins or ends, its width is no measure.
+/// al. 1955, with medians weighted by length, Robertson and Waltman 1968): where a line of wood begins
+/// or ends, or others lie beside it, its width is no measure.
 /// What is not seen is no thinner than what grows from it, and no branch is thicker than what it
 /// grows from.
 pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
-    let seen = |i: usize| seen_px.get(i).copied().flatten();
+    let seen_px = within_pipes(nodes, seen_px);
+    let seen = |i: usize| seen_px[i];
     for axis in axes(nodes) {
         let on_wood: Vec<usize> = axis
             .iter()
             .copied()
             .filter(|i| seen(*i).is_some())
             .collect();
-        let mut stretches = Vec::with_capacity(on_wood.len());
+        let mut measures = Vec::with_capacity(on_wood.len());
         for &i in &on_wood {
-            stretches.push(Stretch {
+            measures.push(Measure {
                 radius_px: seen(i).unwrap_or(0.0),
                 length_px: edge_px(nodes, i),
-                nodes: 1,
             });
         }
-        for (&i, radius_px) in on_wood.iter().zip(falling(&stretches)) {
+        for (&i, radius_px) in on_wood.iter().zip(falling(&measures)) {
             nodes[i].radius = radius_px;
         }
     }
@@ -55,26 +81,70 @@ pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
     }
 }
 
-/// The radii nearest to those of the stretches that do not grow, one for each node.
-fn falling(stretches: &[Stretch]) -> Vec<f64> {
+/// What is seen, but no thicker than the pipe model allows, whose constant is the median over this
+/// tree's wood; one a node.
+fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Option<f64>> {
+    let mut borne_px: Vec<f64> = (0..nodes.len()).map(|i| edge_px(nodes, i)).collect();
+    for i in (1..nodes.len()).rev() {
+        if let Some(parent) = nodes[i].parent.map(NodeId::index).filter(|p| *p < i) {
+            borne_px[parent] += borne_px[i];
+        }
+    }
+    let mut constants = Vec::new();
+    let mut pipes_px = Vec::with_capacity(nodes.len());
+    for (i, borne_px) in borne_px.into_iter().enumerate() {
+        let length_px = edge_px(nodes, i);
+        // At the middle of the edge; a tip bears leaves.
+        let borne_px = borne_px - 0.5 * length_px + TIP_BORNE_PX;
+        let pipe_px = borne_px.powf(PIPE_POWER);
+        constants.extend(seen_px.get(i).copied().flatten().map(|seen_px| Measure {
+            radius_px: seen_px / pipe_px,
+            length_px,
+        }));
+        pipes_px.push(pipe_px);
+    }
+    let most = WITHIN_PIPES * weighted_median(constants);
+    let mut within = Vec::with_capacity(nodes.len());
+    for (i, pipe_px) in pipes_px.into_iter().enumerate() {
+        let seen_px = seen_px.get(i).copied().flatten();
+        within.push(seen_px.map(|px| px.min(most * pipe_px)));
+    }
+    within
+}
+
+/// The radii nearest to those that are seen that do not grow, one for each.
+fn falling(measures: &[Measure]) -> Vec<f64> {
     let mut pooled: Vec<Stretch> = Vec::new();
-    for stretch in stretches {
-        let mut last = *stretch;
-        while let Some(before) = pooled.pop_if(|before| before.radius_px < last.radius_px) {
-            let length_px = before.length_px + last.length_px;
-            let area = before.radius_px * before.length_px + last.radius_px * last.length_px;
-            last = Stretch {
-                radius_px: area / length_px.max(f64::MIN_POSITIVE),
-                length_px,
-                nodes: before.nodes + last.nodes,
-            };
+    for measure in measures {
+        let mut last = Stretch::of(vec![*measure]);
+        while let Some(mut before) = pooled.pop_if(|before| before.radius_px < last.radius_px) {
+            before.measures.append(&mut last.measures);
+            last = Stretch::of(before.measures);
         }
         pooled.push(last);
     }
     let radii = pooled
         .iter()
-        .flat_map(|stretch| std::iter::repeat_n(stretch.radius_px, stretch.nodes));
+        .flat_map(|stretch| std::iter::repeat_n(stretch.radius_px, stretch.measures.len()));
     radii.collect()
+}
+
+/// The radius that half of the length has less than, and half more; 0 of none.
+fn weighted_median(mut measures: Vec<Measure>) -> f64 {
+    measures.sort_by(|a, b| a.radius_px.total_cmp(&b.radius_px));
+    let half_px = 0.5 * measures.iter().map(|m| m.length_px).sum::<f64>();
+    let mut below_px = 0.0;
+    for (k, measure) in measures.iter().enumerate() {
+        below_px += measure.length_px;
+        // Exactly half way it is between two.
+        if below_px == half_px && k + 1 < measures.len() {
+            return 0.5 * (measure.radius_px + measures[k + 1].radius_px);
+        }
+        if below_px > half_px {
+            return measure.radius_px;
+        }
+    }
+    measures.last().map_or(0.0, |last| last.radius_px)
 }
 
 /// The axes of the tree: at every fork an axis goes on in the child from which it is farthest to a
@@ -172,6 +242,21 @@ mod tests {
         }
         assert_eq!(nodes[4].radius, 4.0);
         assert_eq!(nodes[5].radius, 4.0);
+    }
+
+    /// Two branches side by side that are seen as one do not make a thick one.
+    #[test]
+    fn no_branch_is_much_thicker_than_the_wood_that_it_bears_asks_for() {
+        let mut nodes = tree();
+        let seen = [10.0, 9.5, 8.5, 7.5, 7.0, 4.0, 6.0, 6.0];
+        let mut seen_px = vec![None];
+        seen_px.extend(seen[1..].iter().copied().map(Some));
+        let within = within_pipes(&nodes, &seen_px);
+        assert_eq!(within[1..5], seen_px[1..5]);
+        let tip_px = within[7].expect("a radius");
+        assert!((3.0..5.5).contains(&tip_px), "{tip_px}");
+        taper(&mut nodes, &seen_px);
+        assert!(nodes[7].radius <= tip_px, "{:?}", radii(&nodes));
     }
 
     #[test]

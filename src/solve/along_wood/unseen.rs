@@ -59,7 +59,7 @@ impl Build<'_> {
         let from = self.wood.nodes[piece].parent?;
         let from_px = self.wood.nodes[from].position_px;
         let way = self.wood.nodes[piece].position_px - from_px;
-        let share = (end_px - from_px).dot(&way) / way.norm_squared();
+        let share = (end_px - from_px).dot(&way) / way.norm_squared().max(f64::MIN_POSITIVE);
         Some(Beside {
             from,
             at_px: from_px + share.clamp(LEAST_SHARE, 1.0) * way,
