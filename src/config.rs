@@ -27,6 +27,17 @@ pub use settings::{
 
 use std::time::Duration;
 
+impl Shape {
+    /// Planes of a tree that is seen to be bare, or not: all of the branches of a bare one are seen, and
+    /// copies of them would be branches that it does not have.
+    pub fn planes_of(&self, is_bare: bool) -> u32 {
+        match is_bare && !self.copy_bare {
+            true => 1,
+            false => self.planes,
+        }
+    }
+}
+
 impl Camera {
     /// [`timeout_s`](Self::timeout_s) as a duration.
     pub fn time_limit(&self) -> Duration {
@@ -38,5 +49,18 @@ impl Markers {
     /// Whether any markers are to be followed.
     pub fn are_wanted(&self) -> bool {
         self.find || !self.windows.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Shape;
+
+    #[test]
+    fn a_bare_tree_has_no_copies_unless_they_are_asked_for() {
+        let mut shape = Shape::default();
+        assert_eq!((shape.planes_of(false), shape.planes_of(true)), (3, 1));
+        shape.copy_bare = true;
+        assert_eq!(shape.planes_of(true), 3);
     }
 }

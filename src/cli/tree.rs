@@ -110,7 +110,7 @@ impl TreeArgs {
     fn set(&self, config: &mut Config) {
         self.shape.set(config);
         if let Some(planes) = self.planes {
-            config.shape.planes = planes;
+            (config.shape.planes, config.shape.copy_bare) = (planes, true);
         }
         if let Some(triangles) = self.triangles {
             config.wood.triangles = triangles;

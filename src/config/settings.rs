@@ -227,9 +227,9 @@ settings! {
     /// The skeleton in space: what the camera does not see is estimated (Li 2011 sect. 3).
     shape: Shape, TREE {
         /// Planes about the trunk that carry branches, the filmed one included. 2 if the model is
-        /// too dense; 1 leaves the branches that were filmed alone, without copies.
+        /// too dense; 1 leaves only the branches that were filmed, without copies.
         planes: u32 [1 to 8] = 3;
-        /// Copies the branches of a tree that is seen to be bare, too, though all of them are seen.
+        /// Copies the branches of a tree that was filmed bare, too, though all of them are seen.
         copy_bare: bool = false;
         /// The space that branches are pushed to fill. hull if the outline was drawn much wider
         /// than the crown.

@@ -347,6 +347,9 @@ pub struct ModelNote {
     pub metres_per_px: f64,
     /// The trunk's foot in the picture, px: the origin of the model.
     pub foot_px: [f64; 2],
+    /// The film shows its wood, and no leaves on it.
+    #[serde(default)]
+    pub bare: bool,
     /// What the push out of the picture's plane has achieved, where the tree was pushed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub push: Option<crate::shape::PushFigures>,
@@ -364,6 +367,7 @@ impl ModelNote {
             unit: if metres_per_px > 0.0 { "m" } else { "px" }.into(),
             metres_per_px,
             foot_px: skeleton.foot_px.into(),
+            bare: false,
             push: None,
         }
     }
@@ -445,6 +449,11 @@ fn unread(file: &Path, e: serde_json::Error) -> DocumentError {
 }
 
 impl CaptureNote {
+    /// Whether the tree was filmed, and is seen to have no leaves.
+    pub fn is_of_bare(&self) -> bool {
+        self.model.as_ref().is_some_and(|model| model.bare)
+    }
+
     /// Of a tree that was not filmed.
     pub fn not_filmed(
         source: Source,

@@ -13,9 +13,6 @@ pub const WOOD_FILE: &str = "wood.csv";
 const HEADER: &str = "frame,parent,u_px,v_px,radius_px,bare";
 const COLUMNS: [&str; 5] = ["frame", "parent", "u_px", "v_px", "radius_px"];
 
-/// What the last column says of bare wood.
-const BARE: &str = "true";
-
 /// The table as bytes: a row for each node of the wood that was found in a frame, which names its
 /// parent by the number of that one's row. Numbers have all their digits.
 ///
@@ -33,7 +30,7 @@ pub fn wood_csv(seen: &WoodSeen) -> Result<Vec<u8>, WriteError> {
             for number in [node.position_px.x, node.position_px.y, node.radius_px] {
                 table.text(&number.to_string());
             }
-            table.text(if wood.bare { BARE } else { "false" });
+            table.text(&wood.bare.to_string());
             table.end_row()?;
         }
     }
@@ -50,7 +47,11 @@ pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
     let mut seen = std::collections::BTreeMap::<u64, Wood>::new();
     while table.next()? {
         let wood = seen.entry(table.whole(0, "frame")?).or_default();
-        wood.bare = table.optional_cell(bare) == BARE;
+        wood.bare = match table.optional_cell(bare) {
+            "" | "false" => false,
+            "true" => true,
+            other => return Err(table.bad(format!("bare is {other:?}, and must be true or false"))),
+        };
         let branches = &mut wood.branches;
         let parent = match table.cell(1) {
             "" => None,
@@ -71,8 +72,10 @@ pub fn read_wood(dir: &Path) -> Result<WoodSeen, DocumentError> {
         }
         branches.nodes.push(node);
     }
-    let shared = |(frame, wood)| (frame, Arc::new(wood));
-    Ok(seen.into_iter().map(shared).collect())
+    let shared = seen
+        .into_iter()
+        .map(|(frame, wood)| (frame, Arc::new(wood)));
+    Ok(shared.collect())
 }
 
 #[cfg(test)]
@@ -129,5 +132,7 @@ mod tests {
             assert!(read(format!("{head}{rows}").as_bytes()).is_err(), "{rows}");
         }
         assert!(read(b"frame,parent\n").is_err());
+        let odd = b"frame,parent,u_px,v_px,radius_px,bare\n7,,1,2,3,perhaps\n";
+        assert!(read(odd).is_err());
     }
 }

@@ -225,13 +225,29 @@ pub struct Rgb {
     pub pixels: Vec<u8>,
 }
 
+fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
+    red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
+}
+
 /// Brightness of a colour (ITU-R BT.601, the weights that JPEG and YUYV are made with).
 pub fn brightness(colour: [u8; 3]) -> u8 {
     let [r, g, b] = colour.map(u32::from);
     ((77 * r + 150 * g + 29 * b + 128) >> 8) as u8
 }
 
+/// Channels of a pixel that differ by more than this make a colour, levels: what a JPEG of a grey
+/// picture may be off. A picture has colours if this share of it has one.
+const GREY_LEVELS: u8 = 4;
+const COLOUR_SHARE: f64 = 0.001;
+
 impl Rgb {
+    /// Whether it is more than grey.
+    pub fn has_colour(&self) -> bool {
+        let (pixels, _) = self.pixels.as_chunks::<3>();
+        let coloured = pixels.iter().filter(|pixel| is_coloured(**pixel)).count();
+        coloured as f64 > COLOUR_SHARE * pixels.len() as f64
+    }
+
     /// The colour of the pixel at column `u` and row `v`; both must lie in the picture.
     pub fn at(&self, u: u32, v: u32) -> [u8; 3] {
         let i = 3 * (v as usize * self.size.width as usize + u as usize);

@@ -87,4 +87,4 @@ pub use tree_mode::{LimbEnergy, TreeMode};
 pub use tree_strokes::{TreeStrokes, scaled};
 pub use user_notes::{NoteError, UserNote, UserNotes};
 pub use verdict::{Finding, Grade, Judgement, Verdict};
-pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight};
+pub use wood::{AtRest, Masks, Wood, WoodSeen, WoodSight, shows_leaves};

@@ -2,7 +2,7 @@
 
 #[cfg(test)]
 use super::Size;
-use super::{BranchGraph, Luma, Rgb};
+use super::{BranchGraph, Luma, Outline, Rgb};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wood {
     pub branches: BranchGraph,
-    /// No leaves are seen on it.
+    /// No leaves are seen on it, and they would be: the pictures have colour.
     pub bare: bool,
     /// The trunk's bark as a tile that repeats without a seam (sRGB): once round a limb, and as far
     /// along it as it is round. One texel where only its colour is seen, `None` where no trunk is.
@@ -58,6 +58,20 @@ pub struct Masks {
     pub leaves: Luma,
 }
 
+/// A tree is in leaf where leaves cover this share of its outline: of bare trees none do, of trees in
+/// leaf a quarter and more.
+const LEAST_LEAVES: f64 = 0.05;
+
+/// Whether a mask shows leaves on a tree in this outline.
+pub fn shows_leaves(mask: &Luma, outline: Option<&Outline>) -> bool {
+    let leaves = mask.pixels.iter().filter(|p| **p > Masks::MOST_OUTSIDE);
+    let tree = match outline {
+        Some(outline) => outline.mask.iter().filter(|m| **m > 0).count(),
+        None => mask.pixels.len(),
+    };
+    leaves.count() as f64 >= LEAST_LEAVES * tree as f64
+}
+
 impl Masks {
     /// The greatest value of a pixel that is not in the mask.
     pub const MOST_OUTSIDE: u8 = 127;
@@ -77,3 +91,19 @@ pub enum WoodSight {
 
 /// The wood that was found while a film went on, by the newest frame that was looked at.
 pub type WoodSeen = BTreeMap<u64, Arc<Wood>>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Size;
+
+    #[test]
+    fn a_tree_on_which_no_leaves_were_seen_is_bare() {
+        let size = Size::new(20, 10);
+        let pixels = vec![34; 200];
+        let mut mask = Luma { size, pixels };
+        assert!(!shows_leaves(&mask, None));
+        mask.pixels[..20].fill(250);
+        assert!(shows_leaves(&mask, None));
+    }
+}

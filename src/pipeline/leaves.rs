@@ -6,13 +6,9 @@ use super::seeds::seeds;
 use super::seen::Seen;
 use crate::config::{self, LeafShow};
 use crate::geometry::{self, Foliage, LeafColours, LeafView, Template};
-use crate::model::{Luma, Masks, Outline, Rgb, Skeleton};
+use crate::model::{Luma, Outline, Rgb, Skeleton, shows_leaves};
 use crate::shape::Limb;
 use nalgebra::Point2;
-
-/// A tree is in leaf where leaves cover this share of its outline: of bare trees none do, of trees in
-/// leaf a quarter and more.
-const LEAST_LEAVES: f64 = 0.05;
 
 /// What is to be known of the leaves before they grow.
 pub(super) struct InLeaf {
@@ -150,16 +146,6 @@ fn inside(mut drawn: Luma, outline: &Outline) -> Luma {
     drawn
 }
 
-/// Whether a mask shows leaves on a tree in this outline.
-fn shows_leaves(mask: &Luma, outline: Option<&Outline>) -> bool {
-    let leaves = mask.pixels.iter().filter(|p| **p > Masks::MOST_OUTSIDE);
-    let tree = match outline {
-        Some(outline) => outline.mask.iter().filter(|m| **m > 0).count(),
-        None => mask.pixels.len(),
-    };
-    leaves.count() as f64 >= LEAST_LEAVES * tree as f64
-}
-
 /// Whether the picture shows a tree in leaf; without picture or outline nobody knows, and it is
 /// taken for bare.
 fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>) -> bool {
@@ -174,20 +160,4 @@ fn in_leaf(skeleton: &Skeleton, picture: Option<&Rgb>, outline: Option<&Outline>
 #[cfg(not(feature = "opencv"))]
 fn seeds(_picture: &Rgb, _outline: &Outline, _count: u32) -> Vec<Point2<f32>> {
     Vec::new()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::Size;
-
-    #[test]
-    fn a_tree_on_which_no_leaves_were_seen_is_bare() {
-        let size = Size::new(20, 10);
-        let pixels = vec![34; 200];
-        let mut mask = Luma { size, pixels };
-        assert!(!shows_leaves(&mask, None));
-        mask.pixels[..20].fill(250);
-        assert!(shows_leaves(&mask, None));
-    }
 }

@@ -18,10 +18,6 @@ use nalgebra::Point2;
 const CLOSE_SHARE: f64 = 0.008;
 const CLOSE_MOST: f64 = 0.06;
 const NEARLY_ALL: f64 = 0.93;
-/// Channels of a pixel that differ by more than this make a colour, levels: what a JPEG of a grey
-/// picture may be off. A picture has colours if this share of it has one.
-const GREY_LEVELS: u8 = 4;
-const COLOUR_SHARE: f64 = 0.001;
 
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -153,7 +149,7 @@ pub fn see_tree(
 ) -> Result<TreeInPhoto, PhotoError> {
     let looked = Looked {
         picture,
-        has_colour: has_colour(picture),
+        has_colour: picture.has_colour(),
         drawn,
         options,
         cancel,
@@ -336,17 +332,6 @@ fn not_seen(e: NotSeen, drawn: &TreeStrokes) -> PhotoError {
         NotSeen::Trunk | NotSeen::Crown | NotSeen::Leaves | NotSeen::Apart => PhotoError::NoTree,
         NotSeen::Failed(e) => failed(e),
     }
-}
-
-/// Whether a picture is more than grey.
-fn has_colour(picture: &Rgb) -> bool {
-    let (pixels, _) = picture.pixels.as_chunks::<3>();
-    let coloured = pixels.iter().filter(|pixel| is_coloured(**pixel)).count();
-    coloured as f64 > COLOUR_SHARE * pixels.len() as f64
-}
-
-fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
-    red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
 }
 
 impl TreeInPhoto {

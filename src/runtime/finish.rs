@@ -277,10 +277,10 @@ fn note_of(job: &CaptureJob, done: &Done) -> CaptureNote {
     let tree = &**done.replay.model();
     let model = ModelNote {
         push: Some(tree.push_figures(&job.config)),
+        bare: tree.is_bare(),
         ..ModelNote::of(&tree.skeleton, job.config.export.metres_per_px)
     };
     let mut note = describe(job, Some(tree), Some(model));
-    note.config.shape.planes = tree.planes(&job.config);
     note.quality.median_reprojection_px = done.misses.median();
     note
 }

@@ -202,7 +202,7 @@ impl Model {
     }
 
     fn joined_parts(&mut self, before: &Skeleton, config: &Config) -> Skeleton {
-        let plain = match self.planes(config) {
+        let plain = match config.shape.planes_of(self.is_bare()) {
             1 => Arc::new(self.plain.without_copies()),
             _ => self.plain.clone(),
         };
@@ -236,14 +236,9 @@ impl Model {
         joined.skeleton
     }
 
-    /// Planes about the trunk that carry branches: of a tree that is seen to be bare all branches are
-    /// seen, and copies of them would be branches that it does not have.
-    pub fn planes(&self, config: &Config) -> u32 {
-        let is_bare = self.wood.as_ref().is_some_and(|wood| wood.bare);
-        match is_bare && !config.shape.copy_bare {
-            true => 1,
-            false => config.shape.planes,
-        }
+    /// Whether its wood is seen, and no leaves on it.
+    pub fn is_bare(&self) -> bool {
+        self.wood.as_ref().is_some_and(|wood| wood.bare)
     }
 
     /// Gives each branch of `skeleton` the number of points that are on it or on what it carries:

@@ -135,6 +135,7 @@ impl Parent {
     /// empty; the tree is too large to be given another shape.
     pub fn new(document: Document, options: OffspringOptions) -> Result<Self, PrepareError> {
         let mut config = options.config;
+        config.shape.planes = config.shape.planes_of(document.note.is_of_bare());
         let nodes = document.skeleton.measured() * config.shape.planes as usize;
         if nodes > MOST_RESHAPED {
             return Err(PrepareError::TooManyNodes { nodes });

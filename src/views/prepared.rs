@@ -108,13 +108,14 @@ impl PreparedTree {
     /// drawn shape lies off the tree.
     pub fn new(mut document: Document, options: TreeOptions) -> Result<Self, PrepareError> {
         let TreeOptions {
-            config,
+            mut config,
             cut_to,
             leaf,
             density,
         } = options;
         let mut posed = Posed::as_captured(&mut document);
         let reshaped = config.shape != document.note.config.shape;
+        config.shape.planes = config.shape.planes_of(document.note.is_of_bare());
         let changed = reshaped || cut_to.is_some();
         if changed {
             posed.refuse_large(reshaped.then_some(config.shape.planes))?;

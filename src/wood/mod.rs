@@ -43,7 +43,7 @@ pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph, in_ph
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Size, Wood};
+use crate::model::{AtRest, CameraMotion, Foot, Outline, Rgb, Size, Wood, shows_leaves};
 use crate::motion::Spread;
 use crate::signal::median;
 use crate::signal::statistics::median_vector;
@@ -166,13 +166,14 @@ pub fn find(view: View, cancel: &CancelToken) -> opencv::Result<Option<Wood>> {
     }
     let masks = probability::masks(&mask, &evidence)?;
     let bark = bark::tile(&evidence.rest, &masks.wood, &branches);
+    let bare = evidence.rest.has_colour() && !shows_leaves(&masks.leaves, Some(view.outline));
     let at_rest = AtRest {
         picture: evidence.rest,
         masks,
     };
     Ok(Some(Wood {
         branches,
-        bare: !mask.in_leaf,
+        bare,
         bark: bark.map(Arc::new),
         at_rest: Some(Arc::new(at_rest)),
     }))

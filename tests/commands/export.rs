@@ -472,7 +472,7 @@ fn settings_go_file_over_capture_and_command_line_over_file() {
     let file = dir.path().join("metres.toml");
     fs::write(
         &file,
-        "[export]\nmetres_per_px = 0.5\n[shape]\nplanes = 2\n",
+        "[export]\nmetres_per_px = 0.5\n[shape]\nplanes = 2\ncopy_bare = true\n",
     )
     .expect("write");
     let (_dir, out) = exported(
@@ -659,11 +659,18 @@ fn levels_are_files_beside_each_other() {
         );
         let mut of: Vec<usize> = Vec::new();
         let mut highest = 0.0_f32;
-        for primitive in model.meshes().flat_map(|m| m.primitives()) {
-            of.push(primitive.indices().expect("indices").count() / 3);
-            highest = highest.max(primitive.bounding_box().max[1]);
+        let mut looks: Vec<String> = Vec::new();
+        for mesh in model.meshes() {
+            of.push(0);
+            for primitive in mesh.primitives() {
+                *of.last_mut().expect("a mesh") +=
+                    primitive.indices().expect("indices").count() / 3;
+                highest = highest.max(primitive.bounding_box().max[1]);
+                looks.extend(primitive.material().name().map(str::to_owned));
+            }
         }
         assert_eq!(of.len(), 2, "wood and leaves");
+        assert_eq!(looks, ["bark", "bark_made_up", "leaf"]);
         assert!(triangles.is_empty() == (name == "oak.glb"));
         assert!((highest - 7.5).abs() < if triangles.is_empty() { 0.001 } else { 0.3 });
         triangles.push(of);
@@ -891,7 +898,7 @@ fn as_many_nodes_as_can_be_are_exported_or_refused() {
     );
     assert!(plain.status.success(), "{}", told(&plain));
     for more in [
-        &["--planes", "2"][..],
+        &["--planes", "1"][..],
         &["--envelope", "docs/shapes/heart.png"],
     ] {
         let reshaped = export(&bush, "glb", &dir.path().join("other.glb"), more);

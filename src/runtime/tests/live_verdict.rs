@@ -156,3 +156,22 @@ fn a_verdict_costs_little_however_long_the_film_is() {
     println!("{:.2} ms a verdict", took.as_secs_f64() * 100.0);
     assert!(took < Duration::from_millis(2500), "{took:?} in 10 s");
 }
+
+/// What the camera was away before points were followed is not taken off their film.
+#[test]
+fn absences_count_from_where_points_are_followed() {
+    let camera = |reconnects, away_s| CameraState {
+        reconnects,
+        away_s,
+        ..CameraState::default()
+    };
+    let mut film = Film::new(4, 10.0);
+    film.quality = Quality::from_now(&camera(2, 30.0));
+    film.film(11.0);
+    for (state, seconds) in [(camera(2, 30.0), 11.0), (camera(3, 34.0), 7.0)] {
+        let length = film.quality.length(&state);
+        assert!((length.seconds - seconds).abs() < 0.05, "{length:?}");
+        assert!(length.rate_hz.is_some());
+    }
+    assert_eq!(film.quality.length(&camera(9, 90.0)).rate_hz, None);
+}
