@@ -339,6 +339,13 @@ fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
     for k in 0..3 {
         let own = Document::read(&out.join(format!("tree-000{}", k + 1)), 60.0).expect("a tree");
         let scan = own.note.scan.expect("a scan");
+    assert!(!said.contains("no unit"), "{said}");
+    // Without a word on it the feet are metres, and the note says how high the tree is then.
+    let out = dir.path().join("other");
+    let said = done(&["cloud", feet.to_str().expect("name")], &out);
+    let note = "note: no unit in the file: taken as metres, the tree is 16.";
+    assert!(said.contains(note), "{said}");
+    assert!(said.contains("give --unit if that is wrong"), "{said}");
         let foot = Vector3::from(scan.foot_m) - FAR;
         assert!(
             (foot.xy() - Vector2::from(FEET[k])).norm() < 0.08,
