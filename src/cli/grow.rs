@@ -194,8 +194,8 @@ impl GrowArgs {
             None if document.has_motion() || !document.poses.is_empty() => OffspringMotion::Example,
             None if document.has_measured_sway() => {
                 eprint_line(
-                    "arborcam: note: the example has frequencies that were measured, and no film: the trees sway in wind \
-                     with them; give --motion none for trees at rest",
+                    "arborcam: note: the example has frequencies that were measured, and no film: the trees sway in \
+                     wind with them; give --motion none for trees at rest",
                 );
                 OffspringMotion::Wind
             }
