@@ -194,7 +194,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         );
     }
     print_summary(&args.out, &tree, branches);
-    scan.warn_of_tall(&tree);
+    scan.say_unit("the tree", tree.figures.height_m);
     Ok(())
 }
 
@@ -215,15 +215,17 @@ impl Scan {
         Point3::new(along_m * at.x, along_m * at.y, up_m * at.z)
     }
 
-    /// Warns where the tree is so high that the unit may be another.
-    fn warn_of_tall(&self, tree: &CloudTree) {
-        let height_m = tree.figures.height_m;
-        if height_m > TALL_M && !self.unit_is_known {
-            eprint_line(&format!(
-                "arborcam: warning: few trees are {height_m:.0} m high, and nothing says the unit of the \
-                 file; if it is in feet, give --unit ft or --unit us-ft"
-            ));
+    /// Says which unit was taken where neither the file nor `--unit` does: so high a tree shows it. One that is
+    /// too high is a warning. `which` is the tree.
+    fn say_unit(&self, which: &str, height_m: f64) {
+        if self.unit_is_known {
+            return;
         }
+        let word = if height_m > TALL_M { "warning" } else { "note" };
+        eprint_line(&format!(
+            "arborcam: {word}: no unit in the file: taken as metres, {which} is {height_m:.1} m high; give --unit if \
+             that is wrong"
+        ));
     }
 
     /// The tree as a document.

@@ -38,7 +38,7 @@ impl Example {
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let mut document = if ["svg", "json"].map(Some).contains(&ending.to_str()) {
             let flat = read_drawing(path)?;
-            stood_up(path, &flat, config)?.document(Vec::new())?
+            stood_up(path, &flat, config)?.document(&[], Vec::new())?
         } else {
             modelled(path, config)?
         };
@@ -70,7 +70,7 @@ fn modelled(path: &Path, mut config: Config) -> Result<Document, CommandError> {
         let time_s = frame as f64 * model.step_s;
         poses.push(made_flat.pose(&tree.skeleton, &model.tree, places, frame, time_s));
     }
-    Ok(tree.document(poses)?)
+    Ok(tree.document(&made_flat.sway(&model.tree), poses)?)
 }
 
 /// The flat tree in a drawing.

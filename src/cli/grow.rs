@@ -53,7 +53,8 @@ pub struct GrowArgs {
     /// a polygon (JSON) (dirichlet).
     #[arg(long, value_name = "IMAGE|MASK|POLYGON")]
     envelope: Option<PathBuf>,
-    /// How the trees move; by default as the example, or not at all where that does not.
+    /// How the trees move; by default as the example did in its film, in wind where it is a scan with measured
+    /// frequencies, else not at all.
     #[arg(long, value_name = "HOW")]
     motion: Option<HowToMove>,
     /// Settings that differ from those of the example (TOML; see config/arborcam.toml).
@@ -184,13 +185,20 @@ impl GrowArgs {
         Err(CommandError::BadUsage(anyhow!(unfit)))
     }
 
-    /// What is asked for; else as the example where that moves.
+    /// What is asked for; else as the example where that moves, or in wind where its sway was measured.
     fn motion(&self, document: &Document) -> OffspringMotion {
         match self.motion {
             Some(HowToMove::Example) => OffspringMotion::Example,
             Some(HowToMove::Wind) => OffspringMotion::Wind,
             Some(HowToMove::None) => OffspringMotion::AtRest,
             None if document.has_motion() || !document.poses.is_empty() => OffspringMotion::Example,
+            None if document.has_measured_sway() => {
+                eprint_line(
+                    "arborcam: note: the example has frequencies that were measured, and no film: the trees sway in \
+                     wind with them; give --motion none for trees at rest",
+                );
+                OffspringMotion::Wind
+            }
             None => {
                 eprint_line(
                     "arborcam: note: the example has no motion, and the trees stand still; give \

@@ -4,9 +4,10 @@
 //! neighbours; several trees parted from each other ([`stems`]); the foot of the trunk; middle
 //! lines by the shortest ways from there ([`levels`]) or by space colonisation ([`colonise`]);
 //! branches that hardly stand out pruned; radii by circles and tapers ([`radius`]). How well all that
-//! agrees with the points ([`fit`]) makes the [`verdict`].
+//! agrees with the points ([`fit`]), and whether trees are boughs of one ([`boughs`]), makes the [`verdict`].
 
 mod base;
+mod boughs;
 mod circle;
 mod colonise;
 mod error;
@@ -154,6 +155,8 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
             .trees
             .push(own.and_then(|own| tree_of_part(&own, options)));
     }
+    let mut made: Vec<&mut CloudTree> = found.trees.iter_mut().flatten().collect();
+    boughs::look_for_forks(&mut made);
     Ok(found)
 }
 

@@ -62,6 +62,9 @@ pub struct CloudFigures {
     /// Height of the lowest large branch above the foot, as a share of the tree's; `None` where none
     /// leaves the trunk.
     pub clear_stem: Option<f64>,
+    /// Of several trees how far below the feet its trunk comes together with that of another, as a share of the
+    /// height of the higher; `None` where it does with none.
+    pub fork_below: Option<f64>,
 }
 
 impl CloudFigures {

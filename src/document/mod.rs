@@ -282,6 +282,13 @@ impl Document {
         self.dir.join(TRACKS_FILE).exists()
     }
 
+    /// Whether how its branches sway was measured on this tree: in its own film, or in one that was laid on its
+    /// scan. A grown tree has the sway of its example.
+    pub fn has_measured_sway(&self) -> bool {
+        let film_on_scan = self.note.scan.is_some_and(|scan| scan.film.is_some());
+        (film_on_scan || self.has_tracks()) && self.sway.iter().any(Result::is_ok)
+    }
+
     /// The frame of the picture.
     fn pictured(&self) -> Option<u64> {
         self.note.picture.as_ref().map(|p| p.frame)

@@ -149,6 +149,10 @@ pub struct ScanNote {
     /// none.
     #[serde(default)]
     pub clear_stem: Option<f64>,
+    /// Of several trees how far below the feet its trunk comes together with that of another, as a share of the
+    /// height; `null` where it does with none.
+    #[serde(default)]
+    pub fork_below: Option<f64>,
     /// The film that was laid on it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<ScanFilmNote>,

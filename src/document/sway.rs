@@ -1,7 +1,7 @@
 //! What tables say of a branch's sway: the columns of `nodes.csv`, written and read.
 
 use super::number;
-use crate::model::{Excitation, Interval, Sway, SwayColumns, Swaying, Unidentified};
+use crate::model::{Excitation, SwayColumns, Swaying, Unidentified};
 
 /// The columns of `nodes.csv` on the sway, in their order: first [`SwayColumns::NAMES`].
 pub(super) const COLUMNS: [&str; 10] = {
@@ -45,26 +45,21 @@ pub(super) fn cells(sway: &Swaying) -> [String; 10] {
 /// # Errors
 /// It is not told what made a branch sway whose frequency is known.
 pub(super) fn read(cells: [&str; 10]) -> Result<Swaying, String> {
-    let Some(frequency_hz) = interval([cells[0], cells[1], cells[2]]).filter(|f| f.value > 0.0)
-    else {
+    let mut values = [f64::NAN; 6];
+    for (value, cell) in values.iter_mut().zip(cells) {
+        *value = finite(cell).unwrap_or(f64::NAN);
+    }
+    let columns = SwayColumns::of_values(values);
+    if columns.frequency().is_none() {
         return Ok(Err(
             Unidentified::of_word(cells[9]).unwrap_or(Unidentified::NotMeasured)
         ));
-    };
+    }
     let excitation = Excitation::of_word(cells[7])
         .ok_or_else(|| format!("excitation is {:?}, and must be release or wind", cells[7]))?;
-    Ok(Ok(Sway {
-        frequency_hz,
-        damping_ratio: interval([cells[3], cells[4], cells[5]]),
-        excitation,
-        amplitude_deg: finite(cells[8]).unwrap_or(f64::NAN),
-    }))
-}
-
-/// Value and ends, where they are an interval.
-fn interval(cells: [&str; 3]) -> Option<Interval> {
-    let [value, lo, hi] = [finite(cells[0])?, finite(cells[1])?, finite(cells[2])?];
-    (0.0 <= lo && lo <= value && value <= hi).then_some(Interval { value, lo, hi })
+    let amplitude_deg = finite(cells[8]).unwrap_or(f64::NAN);
+    let sway = columns.sway(excitation, amplitude_deg);
+    Ok(sway.ok_or(Unidentified::NotMeasured))
 }
 
 fn finite(cell: &str) -> Option<f64> {

@@ -3,95 +3,103 @@
 //! SimpleForest has `startX`, aRchi `cyl_ID`, both with z up.
 
 use super::error::ImportError;
-use super::model_tree::{Edges, MOST_PLACES, from_z_up};
-use super::sketch::refuse_more;
+use super::model_tree::{Edges, from_z_up};
+use super::segments::{self, Segment};
+use crate::model::SwayColumns;
 use csv::StringRecord;
 use nalgebra::Point3;
-use std::collections::BTreeMap;
 
-const COLUMNS: [&str; 8] = [
-    "ID", "parentID", "start_x", "start_y", "start_z", "end_x", "end_y", "end_z",
-];
-const SIMPLE_FOREST: [&str; 8] = [
-    "ID", "parentID", "startX", "startY", "startZ", "endX", "endY", "endZ",
-];
-const ARCHI: [&str; 8] = [
-    "cyl_ID",
-    "parent_ID",
-    "startX",
-    "startY",
-    "startZ",
-    "endX",
-    "endY",
-    "endZ",
-];
-
-/// Where the columns are, and whether z is up.
-struct Columns {
-    places: [usize; COLUMNS.len()],
+/// The columns of one of the tools.
+struct Table {
+    columns: [&'static str; 8],
+    radius: &'static str,
     is_z_up: bool,
 }
 
-/// The middle lines of the cylinders, each from the end of the one that it grows from: a branch
-/// begins on its carrier's surface or along its way.
+const OURS: Table = Table {
+    columns: [
+        "ID", "parentID", "start_x", "start_y", "start_z", "end_x", "end_y", "end_z",
+    ],
+    radius: "radius",
+    is_z_up: false,
+};
+const SIMPLE_FOREST: Table = Table {
+    columns: [
+        "ID", "parentID", "startX", "startY", "startZ", "endX", "endY", "endZ",
+    ],
+    radius: "radius",
+    is_z_up: true,
+};
+const ARCHI: Table = Table {
+    columns: [
+        "cyl_ID",
+        "parent_ID",
+        "startX",
+        "startY",
+        "startZ",
+        "endX",
+        "endY",
+        "endZ",
+    ],
+    radius: "radius_cyl",
+    is_z_up: true,
+};
+
+/// Where the columns are, and whether z is up.
+struct Columns {
+    places: [usize; OURS.columns.len()],
+    /// `None` where there is no such column.
+    radius: Option<usize>,
+    sway: [Option<usize>; SwayColumns::NAMES.len()],
+    is_z_up: bool,
+}
+
+/// The middle lines of the cylinders with what is said of them.
 ///
 /// # Errors
-/// A column is missing, or a row cannot be read.
+/// A column is missing, a row cannot be read, or what it grows from is not in the table.
 pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
     let mut table = csv::Reader::from_reader(bytes);
-    let columns = columns(table.headers().map_err(ImportError::bad_format)?)?;
-    let mut file = Edges::default();
-    let mut end_of: BTreeMap<i64, usize> = BTreeMap::new();
+    let columns = Columns::of(table.headers().map_err(ImportError::bad_format)?)?;
+    let mut rows: Vec<Segment> = Vec::new();
     for row in table.records() {
         let row = row.map_err(ImportError::bad_format)?;
-        let cylinder = Cylinder::of(&row, &columns).ok_or_else(|| {
+        rows.push(columns.segment(&row).ok_or_else(|| {
             let line = row.position().map_or(0, csv::Position::line);
             ImportError::bad_format(format!("line {line} holds what is no number"))
-        })?;
-        let begin = match end_of.get(&cylinder.parent) {
-            Some(end) => *end,
-            None => {
-                file.places.push(cylinder.start);
-                file.places.len() - 1
-            }
-        };
-        // What stands on the ground is the trunk, and comes first.
-        file.foot = file.foot.or(Some(begin));
-        let end = file.places.len();
-        file.places.push(cylinder.end);
-        file.edges.push([begin, end]);
-        end_of.insert(cylinder.id, end);
-        refuse_more("places", file.places.len(), MOST_PLACES)?;
+        })?);
     }
-    Ok(file)
-}
-
-/// Where the columns of one of the tools are.
-fn columns(header: &StringRecord) -> Result<Columns, ImportError> {
-    let place = |name: &str| header.iter().position(|h| h.trim() == name);
-    for (names, is_z_up) in [(COLUMNS, false), (SIMPLE_FOREST, true), (ARCHI, true)] {
-        let found = names.map(place);
-        if found.iter().all(Option::is_some) {
-            let places = found.map(Option::unwrap_or_default);
-            return Ok(Columns { places, is_z_up });
-        }
+    // Where numbers count from 1, the parent of what stands on the ground is 0.
+    let counts_from_0 = rows.iter().any(|row| row.id == 0);
+    for row in &mut rows {
+        let on_ground = |parent: &i64| *parent < 0 || (*parent == 0 && !counts_from_0);
+        row.parent = row.parent.filter(|parent| !on_ground(parent));
     }
-    let missing = COLUMNS.iter().find(|name| place(name).is_none());
-    let name = missing.copied().unwrap_or_default();
-    Err(ImportError::bad_format(format!(
-        "it has no column {name}, and is no table of cylinders"
-    )))
-}
-
-/// A row of the table.
-struct Cylinder {
-    id: i64,
-    parent: i64,
-    start: Point3<f64>,
-    end: Point3<f64>,
+    segments::edges(rows)
 }
 
 impl Columns {
+    /// Where those of one of the tools are.
+    fn of(header: &StringRecord) -> Result<Self, ImportError> {
+        let place = |name: &str| header.iter().position(|h| h.trim() == name);
+        for table in [OURS, SIMPLE_FOREST, ARCHI] {
+            let found = table.columns.map(place);
+            if found.iter().all(Option::is_some) {
+                return Ok(Self {
+                    places: found.map(Option::unwrap_or_default),
+                    radius: place(table.radius),
+                    sway: SwayColumns::NAMES.map(place),
+                    is_z_up: table.is_z_up,
+                });
+            }
+        }
+        let missing = OURS.columns.iter().find(|name| place(name).is_none());
+        let name = missing.copied().unwrap_or_default();
+        Err(ImportError::bad_format(format!(
+            "it has no column {name}, and is no table of cylinders"
+        )))
+    }
+
     /// A place of the file, turned so that y is up.
     fn place(&self, [x, y, z]: [f64; 3]) -> Point3<f64> {
         match self.is_z_up {
@@ -99,22 +107,34 @@ impl Columns {
             false => Point3::new(x, y, z),
         }
     }
-}
 
-impl Cylinder {
-    /// `None` where a cell holds no number.
-    fn of(row: &StringRecord, columns: &Columns) -> Option<Self> {
-        let mut cells = [0.0; COLUMNS.len()];
-        for (cell, column) in cells.iter_mut().zip(columns.places) {
+    /// The cylinder of a row; `None` where a cell holds no number.
+    fn segment(&self, row: &StringRecord) -> Option<Segment> {
+        let mut cells = [0.0; OURS.columns.len()];
+        for (cell, column) in cells.iter_mut().zip(self.places) {
             *cell = row.get(column)?.trim().parse().ok()?;
         }
         let [id, parent, x, y, z, to_x, to_y, to_z] = cells;
-        Some(Self {
-            id: id as i64,
-            parent: parent as i64,
-            start: columns.place([x, y, z]),
-            end: columns.place([to_x, to_y, to_z]),
+        let mut sway = [f64::NAN; SwayColumns::NAMES.len()];
+        for (cell, column) in sway.iter_mut().zip(self.sway) {
+            *cell = known(row, column)?;
+        }
+        Some(Segment {
+            id: segments::id(id)?,
+            parent: Some(segments::id(parent)?),
+            start: Some(self.place([x, y, z])),
+            end: self.place([to_x, to_y, to_z]),
+            wood: segments::wood(known(row, self.radius)?, sway),
         })
+    }
+}
+
+/// The number in a cell, which is no number where the cell is empty or there is no such column;
+/// `None` where it holds something else.
+fn known(row: &StringRecord, column: Option<usize>) -> Option<f64> {
+    match column.and_then(|column| row.get(column)).map(str::trim) {
+        None | Some("" | "NA") => Some(f64::NAN),
+        Some(cell) => cell.parse().ok(),
     }
 }
 
@@ -141,8 +161,50 @@ mod tests {
             .replace("\n2,1", "\n1,0")
             .replace("\n1,0,0,0,0,0", "\n0,-1,0,0,0,0");
         assert_eq!(edges(with_minus.as_bytes()), Ok(archi));
-        for bad in ["", "ID,parentID\n1,0\n", &table.replace("0.1,1", "x,1")] {
+        for bad in [
+            "",
+            "ID,parentID\n1,0\n",
+            &table.replace("0.1,1", "x,1"),
+            &table.replace("\n2,1", "\n2.5,1"),
+            &table.replace("0.05", "thin"),
+            &table.replace("\n2,1", "\n2,3"),
+        ] {
             assert!(edges(bad.as_bytes()).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn radius_and_sway_are_read_and_rows_may_stand_in_any_order() {
+        let names = "cyl_ID,parent_ID,startX,startY,startZ,endX,endY,endZ,radius_cyl,frequency_hz,\
+                     frequency_lo_hz,frequency_hi_hz,damping_ratio,damping_lo,damping_hi";
+        let rows = [
+            "1,0,0,0,0,0,0,1,0.2,,,,,,",
+            "2,1,0,0,1,0,0,2,0.1,1.5,1.4,1.6,0.03,0.02,0.05",
+            "3,1,0,0,1,1,0,2,NA,2,nan,2.1,,,",
+        ];
+        let in_order = edges(format!("{names}\n{}\n", rows.join("\n")).as_bytes()).expect("sound");
+        let radii: Vec<f64> = in_order.wood.iter().map(|w| w.radius).collect();
+        assert_eq!(radii, [0.2, 0.2, 0.1, 0.0]);
+        let sway = in_order.wood[2].sway.expect("a sway");
+        let damping = sway.damping_ratio.expect("damping");
+        assert_eq!(
+            [
+                sway.frequency_hz.lo,
+                sway.frequency_hz.value,
+                damping.value,
+                damping.hi
+            ],
+            [1.4, 1.5, 0.03, 0.05]
+        );
+        // A frequency counts with its interval only.
+        assert!(in_order.wood[0].sway.or(in_order.wood[3].sway).is_none());
+        let [first, second, third] = rows;
+        let backwards = format!("{names}\n{third}\n{second}\n{first}\n");
+        let backwards = edges(backwards.as_bytes()).expect("sound");
+        assert_eq!(backwards.places, in_order.places);
+        assert_eq!(
+            [backwards.edges, in_order.edges],
+            [[[0, 1], [1, 2], [1, 3]]; 2]
+        );
     }
 }

@@ -10,7 +10,7 @@ use super::error::ImportError;
 use super::flat_tree::{FlatTree, flat_node};
 use super::model_tree::ModelTree;
 use super::sketch::refuse_more;
-use crate::model::{Node, NodeId, Pose, Size, Skeleton};
+use crate::model::{Node, NodeId, Pose, Size, Skeleton, Sway, Swaying, Unidentified};
 use nalgebra::{Point2, Point3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 
@@ -65,7 +65,7 @@ impl FlatModel {
         Ok(Self {
             flat: FlatTree {
                 skeleton: flat_skeleton(upright, &places),
-                has_radii: false,
+                has_radii: model.nodes.iter().all(|n| n.wood.radius > 0.0),
                 trunk_px: Vec::new(),
                 crown_px: Vec::new(),
             },
@@ -101,6 +101,21 @@ impl FlatModel {
         }
     }
 
+    /// How the branch that ends in each node of the flat tree sways, as far as `model` says: as the last
+    /// of its pieces of which that is known.
+    pub fn sway(&self, model: &ModelTree) -> Vec<Swaying> {
+        let children = model.children();
+        let mut known: Vec<Option<Sway>> = Vec::with_capacity(model.nodes.len());
+        for node in &model.nodes {
+            let below = node.parent.filter(|p| children[*p].len() == 1);
+            known.push(node.wood.sway.or(below.and_then(|p| known[p])));
+        }
+        let of_model = self.of_model.iter();
+        of_model
+            .map(|i| known[*i].ok_or(Unidentified::NotMeasured))
+            .collect()
+    }
+
     /// How the branch between two nodes of the flat tree has turned.
     fn rotation(
         &self,
@@ -131,12 +146,7 @@ struct Forks {
 
 impl Forks {
     fn of(model: &ModelTree) -> Result<Self, ImportError> {
-        let mut children: Vec<Vec<usize>> = vec![Vec::new(); model.nodes.len()];
-        for (i, node) in model.nodes.iter().enumerate() {
-            if let Some(parent) = node.parent {
-                children[parent].push(i);
-            }
-        }
+        let children = model.children();
         let mut forks = Self {
             of_model: Vec::new(),
             parents: Vec::new(),
@@ -188,6 +198,7 @@ impl Forks {
             let parent = parent.map(|p| NodeId(p as u32));
             let mut node = flat_node(i, parent, level, Point2::origin(), Point2::origin());
             node.position = Point3::from((model.nodes[*of_model].position - foot) * scale);
+            node.radius = model.nodes[*of_model].wood.radius * scale;
             node.certainty = if carries[i] && i > 0 { 1.0 } else { 0.0 };
             nodes.push(node);
         }

@@ -2,6 +2,7 @@
 
 use super::error::ImportError;
 use super::sketch::refuse_more;
+use crate::model::Sway;
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -24,6 +25,16 @@ pub struct ModelNode {
     pub position: Point3<f64>,
     /// Its place among those of the file.
     pub place: usize,
+    /// What ends here.
+    pub wood: Wood,
+}
+
+/// What a file says of the wood that ends in a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wood {
+    /// In the unit of the file; 0 where it is not known.
+    pub radius: f64,
+    pub sway: Option<Sway>,
 }
 
 /// What a file says: places, and which of them are joined.
@@ -31,6 +42,8 @@ pub struct ModelNode {
 pub(super) struct Edges {
     pub places: Vec<Point3<f64>>,
     pub edges: Vec<[usize; 2]>,
+    /// By place; empty where the file says nothing of the wood.
+    pub wood: Vec<Wood>,
     /// The place of the foot where the file says so, else it is the lowest.
     pub foot: Option<usize>,
 }
@@ -78,7 +91,11 @@ impl ModelTree {
         let Some(foot) = foot.filter(|foot| neighbours.contains_key(foot)) else {
             return Err(ImportError::NoSkeleton);
         };
-        let nodes = from_foot(foot, &neighbours, &file.places)?;
+        let mut nodes = from_foot(foot, &neighbours, &file.places)?;
+        let wood = file.wood_by(&one);
+        for node in &mut nodes {
+            node.wood = wood.get(node.place).copied().unwrap_or_default();
+        }
         if nodes.len() < neighbours.len() {
             return Err(ImportError::InPieces {
                 joined: nodes.len(),
@@ -89,6 +106,35 @@ impl ModelTree {
             nodes,
             metres_per_unit: 0.0,
         })
+    }
+}
+
+impl ModelTree {
+    /// Of every node those that hang on it.
+    pub(super) fn children(&self) -> Vec<Vec<usize>> {
+        let mut children: Vec<Vec<usize>> = vec![Vec::new(); self.nodes.len()];
+        for (i, node) in self.nodes.iter().enumerate() {
+            if let Some(parent) = node.parent {
+                children[parent].push(i);
+            }
+        }
+        children
+    }
+}
+
+impl Edges {
+    /// What is known of the wood that ends in each place, where `one` says of each the first one that
+    /// is the same.
+    fn wood_by(&self, one: &[usize]) -> Vec<Wood> {
+        let mut wood = vec![Wood::default(); self.wood.len()];
+        for (own, first) in self.wood.iter().zip(one) {
+            let known = &mut wood[*first];
+            if known.radius == 0.0 {
+                known.radius = own.radius;
+            }
+            known.sway = known.sway.or(own.sway);
+        }
+        wood
     }
 }
 
@@ -114,6 +160,7 @@ fn from_foot(
         parent: None,
         position: places[foot],
         place: foot,
+        wood: Wood::default(),
     }];
     let mut is_known = vec![false; places.len()];
     is_known[foot] = true;
@@ -131,6 +178,7 @@ fn from_foot(
                 parent: Some(next),
                 position: places[end],
                 place: end,
+                wood: Wood::default(),
             });
         }
         next += 1;
@@ -146,7 +194,7 @@ mod tests {
         ModelTree::of_edges(&Edges {
             places: places.iter().copied().map(Point3::from).collect(),
             edges: edges.to_vec(),
-            foot: None,
+            ..Edges::default()
         })
     }
 

@@ -86,6 +86,7 @@ mod tests {
         let expected = Edges {
             places: vec![Point3::new(0.0, 1.0, -0.0), Point3::new(3.0, 5.0, -4.0)],
             edges: vec![[0, 1]],
+            wood: Vec::new(),
             foot: None,
         };
         assert_eq!(edges(ascii.as_bytes()), Ok(expected.clone()));

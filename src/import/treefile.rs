@@ -4,21 +4,27 @@
 
 use super::error::ImportError;
 use super::model_tree::{Edges, MOST_PLACES, from_z_up};
+use super::segments::{self, Segment};
 use super::sketch::refuse_more;
+use crate::model::SwayColumns;
 
 /// What a header says on a line: how many numbers there are of the tree and of each segment, and
-/// where in a segment its place and its parent are.
+/// where in a segment its place, its parent and what else is known of it are.
 struct Columns {
     of_tree: usize,
     of_segment: usize,
     place: [usize; 3],
     parent: usize,
+    /// `None` where there is no such column.
+    radius: Option<usize>,
+    sway: [Option<usize>; SwayColumns::NAMES.len()],
 }
 
 /// The ways from each segment's parent to it, turned so that y is up.
 ///
 /// # Errors
-/// The header names no `x`, `y`, `z` and `parent_id`, a line cannot be read, or there are several trees.
+/// The header names no `x`, `y`, `z` and `parent_id`, a line cannot be read, there are several trees,
+/// or a parent is not in it.
 pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
     let lines = (1..).zip(text.lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
@@ -40,9 +46,10 @@ pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
         line.matches(',').count() / columns.of_segment,
         MOST_PLACES,
     )?;
-    columns.edges(line).ok_or_else(|| {
+    let segments = columns.segments(line).ok_or_else(|| {
         ImportError::bad_format(format!("line {number} does not hold what its header says"))
-    })
+    })?;
+    segments::edges(segments)
 }
 
 /// The cells of a line; one behind the last comma may be empty.
@@ -61,34 +68,33 @@ impl Columns {
             of_segment: segment.len(),
             place: [column("x")?, column("y")?, column("z")?],
             parent: column("parent_id")?,
+            radius: column("radius"),
+            sway: SwayColumns::NAMES.map(column),
         })
     }
 
     /// Of the line of one tree; `None` where it cannot be read.
-    fn edges(&self, line: &str) -> Option<Edges> {
+    fn segments(&self, line: &str) -> Option<Vec<Segment>> {
         let mut numbers: Vec<f64> = Vec::new();
         for cell in cells(line) {
             numbers.push(cell.parse().ok()?);
         }
-        let segments = numbers.get(self.of_tree..)?.chunks_exact(self.of_segment);
-        if segments.len() == 0 || !segments.remainder().is_empty() {
+        let rows = numbers.get(self.of_tree..)?.chunks_exact(self.of_segment);
+        if rows.len() == 0 || !rows.remainder().is_empty() {
             return None;
         }
-        let mut file = Edges::default();
-        for segment in segments {
-            let parent = segment[self.parent];
-            let own = file.places.len();
-            file.places
-                .push(from_z_up(self.place.map(|column| segment[column])));
-            if parent < 0.0 {
-                file.foot = file.foot.or(Some(own));
-            } else if parent.fract() == 0.0 && parent < MOST_PLACES as f64 {
-                file.edges.push([parent as usize, own]);
-            } else {
-                return None;
-            }
+        let mut segments = Vec::with_capacity(rows.len());
+        for (number, row) in (0..).zip(rows) {
+            let cell = |column: Option<usize>| column.map_or(f64::NAN, |column| row[column]);
+            segments.push(Segment {
+                id: number,
+                parent: Some(segments::id(row[self.parent])?).filter(|parent| *parent >= 0),
+                start: None,
+                end: from_z_up(self.place.map(|column| row[column])),
+                wood: segments::wood(cell(self.radius), self.sway.map(cell)),
+            });
         }
-        Some(file)
+        Some(segments)
     }
 }
 
@@ -106,6 +112,30 @@ mod tests {
         assert_eq!(file.foot, Some(0));
         assert_eq!(file.edges, [[0, 1], [1, 2], [1, 3]]);
         assert_eq!(file.places[2], Point3::new(1.0, 2.0, -3.0));
+        assert!(
+            file.wood
+                .iter()
+                .all(|w| w.radius == 0.1 && w.sway.is_none())
+        );
+    }
+
+    /// Parents may stand behind what grows from them.
+    #[test]
+    fn the_order_of_segments_does_not_matter_and_sway_is_read() {
+        let names = SwayColumns::NAMES.join(",");
+        let text = format!(
+            "x,y,z,radius,parent_id,{names}\n\
+             1,3,2,0.1,1,2,1.9,2.1,nan,nan,nan, 1,2,1,0.2,2,nan,nan,nan,nan,nan,nan, \
+             1,2,0,0.3,-1,nan,nan,nan,nan,nan,nan\n"
+        );
+        let file = edges(&text).expect("sound");
+        assert_eq!(file.foot, Some(2));
+        assert_eq!(file.edges, [[1, 0], [2, 1]]);
+        let hz = |i: usize| file.wood[i].sway.map(|sway| sway.frequency_hz.value);
+        assert_eq!([hz(0), hz(1), hz(2)], [Some(2.0), None, None]);
+        let circle = text.replace("0.3,-1", "0.3,0");
+        let said = edges(&circle).expect_err("a circle").to_string();
+        assert!(said.contains("grows from itself"), "{said}");
     }
 
     #[test]
@@ -119,6 +149,7 @@ mod tests {
             &FORK.replace("0.1,-1", "0.1,-1,4"),
             &FORK.replace("0.1,1, 0", "0.1,1.5, 0"),
             &FORK.replace("0.1,0,", "0.1,1e300,"),
+            &FORK.replace("0.1,0,", "0.1,4,"),
             &FORK.replace("0,2,2.5", "0,up,2.5"),
             &format!("{FORK}{tree}\n"),
         ] {

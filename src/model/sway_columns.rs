@@ -1,6 +1,6 @@
 //! Frequency and damping of a sway as columns of tables and keys of JSON.
 
-use super::{Interval, Sway};
+use super::{Excitation, Interval, Sway};
 use serde::Serialize;
 
 /// Frequency and damping with their 95 % intervals, in the order of the columns; no number (`null`
@@ -48,6 +48,42 @@ impl SwayColumns {
         }
     }
 
+    /// The columns with these values, in the order of [`NAMES`](Self::NAMES).
+    pub fn of_values(values: [f64; 6]) -> Self {
+        let [
+            frequency_hz,
+            frequency_lo_hz,
+            frequency_hi_hz,
+            damping_ratio,
+            damping_lo,
+            damping_hi,
+        ] = values;
+        Self {
+            frequency_hz,
+            frequency_lo_hz,
+            frequency_hi_hz,
+            damping_ratio,
+            damping_lo,
+            damping_hi,
+        }
+    }
+
+    /// The frequency, which counts with its interval only.
+    pub fn frequency(&self) -> Option<Interval> {
+        let ends = [self.frequency_lo_hz, self.frequency_hi_hz];
+        interval(self.frequency_hz, ends).filter(|f| f.value > 0.0)
+    }
+
+    /// The sway that they say, of what made it so large; `None` without a frequency.
+    pub fn sway(&self, excitation: Excitation, amplitude_deg: f64) -> Option<Sway> {
+        Some(Sway {
+            frequency_hz: self.frequency()?,
+            damping_ratio: interval(self.damping_ratio, [self.damping_lo, self.damping_hi]),
+            excitation,
+            amplitude_deg,
+        })
+    }
+
     /// In the order of [`NAMES`](Self::NAMES).
     pub fn values(&self) -> [f64; 6] {
         [
@@ -59,6 +95,12 @@ impl SwayColumns {
             self.damping_hi,
         ]
     }
+}
+
+/// A value and its ends, where they are an interval.
+fn interval(value: f64, [lo, hi]: [f64; 2]) -> Option<Interval> {
+    let is_one = 0.0 <= lo && lo <= value && value <= hi && hi.is_finite();
+    is_one.then_some(Interval { value, lo, hi })
 }
 
 /// The interval; no numbers where there is none.
@@ -73,7 +115,6 @@ fn ends(interval: Option<Interval>) -> Interval {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Excitation;
 
     #[test]
     fn the_names_are_the_keys_of_json_and_stand_in_the_order_of_the_values() {

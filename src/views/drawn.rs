@@ -70,12 +70,13 @@ impl DrawnTree {
         write_document(dir, draft, sway, stop)
     }
 
-    /// The document that would be read back, with `poses` as its motion.
+    /// The document that would be read back, with the sway of its nodes, by node index, and with `poses` as
+    /// its motion.
     ///
     /// # Errors
     /// It cannot be read back, as it reaches too far.
-    pub fn document(&self, poses: Vec<Pose>) -> Result<Document, PrepareError> {
-        let mut document = Document::as_read(&self.note, &self.skeleton, &[], None)?;
+    pub fn document(&self, sway: &[Swaying], poses: Vec<Pose>) -> Result<Document, PrepareError> {
+        let mut document = Document::as_read(&self.note, &self.skeleton, sway, None)?;
         document.poses = poses;
         Ok(document)
     }

@@ -136,6 +136,7 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         on_wood: Some(figures.on_wood),
         foot_share: figures.foot_share,
         clear_stem: figures.clear_stem,
+        fork_below: figures.fork_below,
         film: None,
     }
 }

@@ -278,6 +278,48 @@ fn a_crown_without_its_trunk_is_no_good_tree() {
     assert!(line.contains("a crown without its trunk"), "{line}");
 }
 
+/// Two boughs from a fork 1 m below the cut, each with a branch; and two trunks with the same ones.
+const BOUGHS: [Tube; 4] = [
+    ([0.43, 0.0, 0.0], [1.73, 0.0, 3.0], 0.09, 0.03),
+    ([0.86, 0.0, 1.0], [1.0, 1.0, 2.2], 0.04, 0.015),
+    ([-0.3, 0.37, 0.0], [-1.2, 1.47, 3.0], 0.08, 0.03),
+    ([-0.6, 0.74, 1.0], [-1.5, 0.3, 2.2], 0.04, 0.015),
+];
+const TRUNKS: [Tube; 4] = [
+    ([0.0, 0.0, 0.0], [0.2, 0.1, 3.0], 0.09, 0.03),
+    ([0.07, 0.03, 1.0], [0.2, 1.0, 2.2], 0.04, 0.015),
+    ([2.0, 0.3, 0.0], [2.1, 0.2, 3.0], 0.08, 0.03),
+    ([2.03, 0.27, 1.0], [1.2, 0.0, 2.2], 0.04, 0.015),
+];
+
+#[test]
+fn boughs_of_a_crown_are_no_good_trees_and_trunks_are() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    for (name, tubes, expected) in [
+        (
+            "boughs",
+            &BOUGHS,
+            "verdict: fair, because: its trunk comes together",
+        ),
+        ("trunks", &TRUNKS, "verdict: good"),
+    ] {
+        let [cloud, out] =
+            [format!("{name}.xyz"), name.to_owned()].map(|name| dir.path().join(name));
+        let points = points_on(tubes, 0.01, 0.003, &mut Chance::new(7));
+        write_xyz(&cloud, &points, 1.0);
+        let said = done(&["cloud", cloud.to_str().expect("name")], &out);
+        let verdicts: Vec<&str> = said
+            .lines()
+            .filter(|l| l.starts_with("verdict: "))
+            .collect();
+        assert_eq!(verdicts.len(), 2, "{said}");
+        assert!(
+            verdicts.iter().all(|line| line.starts_with(expected)),
+            "{said}"
+        );
+    }
+}
+
 #[test]
 fn units_are_taken_as_given() {
     let dir = tempfile::tempdir().expect("tempdir");
@@ -297,6 +339,13 @@ fn units_are_taken_as_given() {
         .parse()
         .expect("a number");
     assert!((4.9..5.1).contains(&height), "{said}");
+    assert!(!said.contains("no unit"), "{said}");
+    // Without a word on it the feet are metres, and the note says how high the tree is then.
+    let out = dir.path().join("other");
+    let said = done(&["cloud", feet.to_str().expect("name")], &out);
+    let note = "note: no unit in the file: taken as metres, the tree is 16.";
+    assert!(said.contains(note), "{said}");
+    assert!(said.contains("give --unit if that is wrong"), "{said}");
 }
 
 /// Trees on a slope, not far from each other, each turned and of another size.

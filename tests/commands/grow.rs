@@ -3,7 +3,7 @@
 use crate::support::{names_in, replayed as example};
 use arborcam::document::note::ModelNote;
 use arborcam::document::{CaptureNote, Document};
-use arborcam::model::{NodeKind, Skeleton, Timing};
+use arborcam::model::{NodeKind, Skeleton, Swaying, Timing};
 use arborcam::pipeline::reshape;
 use arborcam::shape::{Angles, Envelope, envelope_distance};
 use arborcam::views::{Draft, PrepareError, example_outline, write_document};
@@ -172,6 +172,45 @@ fn trees_move_as_they_are_told() {
         output.status.success() && told.contains("stand still"),
         "{told}"
     );
+}
+
+/// The same tree, at first as it was grown, then as a scan on which a film was laid.
+#[test]
+fn frequencies_that_were_measured_on_a_scan_move_its_trees() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let at_rest = ["--count", "1", "--motion", "none"];
+    grown(&dir.path().join("rest"), &at_rest);
+    let example = dir.path().join("rest/tree-0001");
+    let known = Document::read(&example, 60.0).expect("a tree").sway;
+    assert!(known.iter().any(Result::is_ok), "no branch has a frequency");
+    let path = example.join("capture.json");
+    let text = fs::read_to_string(&path).expect("note");
+    let mut note: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let film = serde_json::json!({
+        "turn_deg": 0, "roll_deg": 0, "px_per_metre": 100, "miss": 0.01, "other_side_miss": 0.05, "branches": 3
+    });
+    let scan = serde_json::json!({
+        "foot_m": [0, 0, 0], "points": 1, "ground_points": 0, "noise_points": 0, "apart_points": 0, "cell_m": 0.01,
+        "noise_m": 0.001, "twig_radius_m": 0.002
+    });
+    for (with_film, expected) in [(false, "stand still"), (true, "sway in wind")] {
+        note["scan"] = scan.clone();
+        if with_film {
+            note["scan"]["film"] = film.clone();
+        }
+        fs::write(&path, note.to_string()).expect("write");
+        let out = dir.path().join(expected);
+        let output = grow(&example, &out, &["--count", "1"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.contains(expected), "{said}");
+        let tree = Document::read(&out.join("tree-0001"), 60.0).expect("a tree");
+        assert_eq!(tree.poses.is_empty(), !with_film);
+        let hz = |sway: &Swaying| sway.ok().map(|sway| sway.frequency_hz.value);
+        let frequencies: Vec<f64> = known.iter().filter_map(hz).collect();
+        let mut own = tree.sway.iter().filter_map(hz).peekable();
+        assert!(own.peek().is_some(), "no branch has a frequency");
+        assert!(own.all(|f| frequencies.contains(&f)));
+    }
 }
 
 #[test]

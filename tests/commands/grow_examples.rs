@@ -6,7 +6,7 @@ use crate::support::{names_in, replayed};
 use crate::to_folder::{FAILED, NO_INPUT, command, done};
 use arborcam::document::Document;
 use arborcam::import::{FlatModel, read_model};
-use arborcam::model::{NodeId, Skeleton};
+use arborcam::model::{NodeId, Skeleton, Sway};
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -41,7 +41,8 @@ fn models() -> &'static Path {
         let skeleton = &Document::read(&at("tree"), 0.0).expect("tree").skeleton;
         fs::write(at("lines.obj"), as_obj(skeleton)).expect("write");
         fs::write(at("edges.ply"), as_ply(skeleton)).expect("write");
-        fs::write(at("segments.txt"), as_treefile(skeleton)).expect("write");
+        fs::write(at("segments.txt"), as_treefile(skeleton, false)).expect("write");
+        fs::write(at("thick.txt"), as_treefile(skeleton, true)).expect("write");
         fs::write(at("nodes.gltf"), as_gltf(skeleton)).expect("write");
         dir
     });
@@ -83,13 +84,18 @@ fn as_ply(skeleton: &Skeleton) -> String {
     file
 }
 
-/// With z up, as RayCloudTools write it.
-fn as_treefile(skeleton: &Skeleton) -> String {
-    let mut file = "# Tree file.\nheight, x,y,z,radius,parent_id\n1".to_owned();
+/// With z up, as RayCloudTools write it, or without radii.
+fn as_treefile(skeleton: &Skeleton, has_radii: bool) -> String {
+    let radius = if has_radii { "radius," } else { "" };
+    let mut file = format!("# Tree file.\nheight, x,y,z,{radius}parent_id\n1");
     for node in &skeleton.nodes {
         let [x, y, z] = node.position.into();
         let parent = node.parent.map_or(-1, |parent| i64::from(parent.0));
-        write!(file, ", {x},{},{y},{},{parent}", -z, node.radius).expect("text");
+        write!(file, ", {x},{},{y},", -z).expect("text");
+        if has_radii {
+            write!(file, "{},", node.radius).expect("text");
+        }
+        write!(file, "{parent}").expect("text");
     }
     file
 }
@@ -156,6 +162,112 @@ fn lines_edges_segments_and_nodes_make_the_same_trees() {
     let [obj, gltf] = [0, 3].map(|k| forks_and_tips(&tables[k].2.skeleton));
     assert_eq!(obj, gltf);
     assert!(tables[3].2.metres_per_px() > 0.0 && tables[0].2.metres_per_px() == 0.0);
+}
+
+/// Radii of a file are kept, and the trunks of new trees go by them; the form of the example is the same.
+#[test]
+fn radii_of_a_treefile_are_those_of_its_tree() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let tree = Document::read(&models().join("tree"), 0.0)
+        .expect("tree")
+        .skeleton;
+    let flat = |name: &str| {
+        let path = models().join(name);
+        let model = read_model(&fs::read(&path).expect("file"), &path).expect("a model");
+        FlatModel::of(&model.tree, 3).expect("made flat").flat
+    };
+    let (thick, thin) = (flat("thick.txt"), flat("segments.txt"));
+    assert!(thick.has_radii && !thin.has_radii);
+    assert_eq!(thick.skeleton.nodes.len(), thin.skeleton.nodes.len());
+    let heights = |s: &Skeleton| s.nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
+    let scale = heights(&thick.skeleton) / heights(&tree);
+    let radii: Vec<f64> = tree.nodes.iter().map(|n| n.radius * scale).collect();
+    for (own, bare) in thick.skeleton.nodes.iter().zip(&thin.skeleton.nodes) {
+        assert_eq!((own.position, bare.radius), (bare.position, 0.0));
+        assert!(radii.iter().any(|r| (r - own.radius).abs() < 1e-6));
+    }
+    let grown = grown(
+        &models().join("thick.txt"),
+        &dir.path().join("trees"),
+        &["--motion", "none"],
+    );
+    let trunk = thick.skeleton.nodes[1].radius;
+    let own = grown.skeleton.nodes[1].radius;
+    assert!(
+        (own / trunk - 1.0).abs() < 0.05,
+        "{own} px against {trunk} px"
+    );
+}
+
+/// Frequency and damping with their intervals go through both tables; what the branches of the file have is
+/// what those of the film have.
+#[test]
+fn sway_and_radii_go_through_tables() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let film = Document::read(replayed(), 0.0).expect("a capture");
+    let mut measured: Vec<[i64; 6]> = film.sway.iter().flatten().map(rounded).collect();
+    measured.sort_unstable();
+    measured.dedup();
+    assert!(!measured.is_empty(), "the film says nothing");
+    let mut radii: Vec<Vec<f64>> = Vec::new();
+    for (format, name) in [("qsm", "tree.csv"), ("treefile", "tree.txt")] {
+        let path = dir.path().join(name);
+        done(&["export", text(replayed()), "--format", format], &path);
+        let model = read_model(&fs::read(&path).expect("file"), &path).expect("a model");
+        let nodes = &model.tree.nodes;
+        let mut own: Vec<[i64; 6]> = nodes
+            .iter()
+            .filter_map(|n| n.wood.sway.as_ref())
+            .map(rounded)
+            .collect();
+        own.sort_unstable();
+        own.dedup();
+        assert_eq!(own, measured, "{name}");
+        assert!(nodes.iter().all(|n| n.wood.radius > 0.0), "{name}");
+        radii.push(nodes.iter().map(|n| n.wood.radius).collect());
+        let flat = FlatModel::of(&model.tree, 1).expect("made flat");
+        assert_eq!(flat.flat.skeleton.nodes.len(), flat.sway(&model.tree).len());
+        assert!(flat.sway(&model.tree).iter().any(Result::is_ok), "{name}");
+        let out = dir.path().join(format);
+        let tree = grown(&path, &out, &["--motion", "wind"]);
+        let mut known = tree.sway.iter().flatten().map(rounded).peekable();
+        assert!(
+            known.peek().is_some() && known.all(|sway| measured.contains(&sway)),
+            "{name}"
+        );
+    }
+    for (a, b) in radii[0].iter().zip(&radii[1]) {
+        assert!((a - b).abs() <= 1e-3, "{a} against {b}");
+    }
+    // Rows in any order make the same tree.
+    let [table, turned] = ["tree.csv", "turned.csv"].map(|name| dir.path().join(name));
+    let rows = fs::read_to_string(&table).expect("table");
+    let (header, rows) = rows.split_once('\n').expect("a header");
+    let mut lines: Vec<&str> = rows.lines().rev().collect();
+    lines.insert(0, header);
+    fs::write(&turned, lines.join("\n")).expect("write");
+    let trees = [table, turned].map(|path| {
+        read_model(&fs::read(&path).expect("file"), &path)
+            .expect("a model")
+            .tree
+    });
+    assert_eq!(trees[0].nodes.len(), trees[1].nodes.len());
+    for (a, b) in trees[0].nodes.iter().zip(&trees[1].nodes) {
+        assert_eq!(
+            (a.parent, a.position, a.wood.radius),
+            (b.parent, b.position, b.wood.radius)
+        );
+    }
+}
+
+/// A sway in the decimals of tables; 0 where there is no damping.
+fn rounded(sway: &Sway) -> [i64; 6] {
+    let damping = sway
+        .damping_ratio
+        .map_or([0.0; 3], |d| [d.value, d.lo, d.hi]);
+    let [d, d_lo, d_hi] = damping;
+    let f = sway.frequency_hz;
+    [f.value, f.lo, f.hi, d, d_lo, d_hi].map(|x| (1e5 * x).round() as i64)
 }
 
 #[test]
@@ -353,6 +465,16 @@ fn bad_examples_get_one_line_and_leave_nothing() {
         ("odd.ply", b"ply\nformat ascii 1.0\nend_header\n".to_vec(), "no skeleton"),
         ("odd.csv", b"a,b\n1,2\n".to_vec(), "no column"),
         ("odd.txt", b"a,b\n1,2\n".to_vec(), "no treefile"),
+        (
+            "round.csv",
+            b"ID,parentID,startX,startY,startZ,endX,endY,endZ\n1,2,0,0,0,0,0,1\n2,1,0,0,1,0,0,2\n".to_vec(),
+            "grows from itself",
+        ),
+        (
+            "unknown.csv",
+            b"ID,parentID,startX,startY,startZ,endX,endY,endZ\n1,0,0,0,0,0,0,1\n2,7,0,0,1,0,0,2\n".to_vec(),
+            "piece 2 grows from 7, which is not in it",
+        ),
         ("two.txt", b"x,y,z,parent_id\n0,0,0,-1\n0,0,0,-1\n".to_vec(), "2 trees"),
         ("tree.stl", b"solid".to_vec(), "does not say"),
         ("few.svg", fs::read(DRAWING).expect("drawing")[..420].to_vec(), "damaged"),

@@ -45,7 +45,7 @@ pub(super) fn write(
     let trees = found.trees.iter().flatten();
     let highest = trees.max_by(|a, b| a.figures.height_m.total_cmp(&b.figures.height_m));
     if let Some(highest) = highest {
-        scan.warn_of_tall(highest);
+        scan.say_unit("the highest tree", highest.figures.height_m);
     }
     let Some(forest) = scan_forest(&scan.name, &standing, &found, scan.config.wood.seed.into())
     else {

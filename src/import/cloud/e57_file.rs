@@ -1,6 +1,6 @@
 //! E57.
 
-use super::{Points, refuse_many};
+use super::{Points, Units, refuse_many};
 use crate::caught::caught;
 use crate::import::error::ImportError;
 use e57::{CartesianCoordinate, E57Reader};
@@ -49,6 +49,10 @@ fn check_header(input: &mut (impl Read + Seek)) -> Result<(), ImportError> {
 
 fn read_scans<R: BufRead + Seek>(input: R, points: &mut Points) -> Result<(), ImportError> {
     let mut file = E57Reader::new(input).map_err(ImportError::bad_format)?;
+    // Its lengths are metres (ASTM E2807).
+    if !points.unit_is_given {
+        points.take_units(Units::METRES);
+    }
     let scans = file.pointclouds();
     for scan in &scans {
         refuse_many(scan.records)?;

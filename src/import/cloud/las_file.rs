@@ -1,6 +1,7 @@
 //! LAS and LAZ.
 
 use super::las_units::units_of;
+use super::laz_chunks::{ChunkedFile, end_of_chunks};
 use super::{Points, refuse_many};
 use crate::caught::caught;
 use crate::import::error::ImportError;
@@ -114,11 +115,12 @@ pub(super) fn number(bytes: &[u8]) -> u64 {
         .fold(0, |sum, byte| (sum << 8) | u64::from(*byte))
 }
 
-fn read_points<R>(input: R, size: u64, points: &mut Points) -> Result<(), ImportError>
+fn read_points<R>(mut input: R, size: u64, points: &mut Points) -> Result<(), ImportError>
 where
     R: BufRead + Seek + Send + Sync + 'static,
 {
-    let mut reader = Reader::new(input).map_err(damaged)?;
+    let points_end = end_of_chunks(&mut input, size).map_err(damaged)?;
+    let mut reader = Reader::new(ChunkedFile::new(input, points_end)).map_err(damaged)?;
     let said = reader.header().number_of_points();
     refuse_many(said)?;
     // The decompressor goes on behind the end of the file.

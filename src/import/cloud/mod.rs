@@ -3,6 +3,7 @@
 mod e57_file;
 mod las_file;
 mod las_units;
+mod laz_chunks;
 mod lzf;
 mod pcd;
 mod ply_points;

@@ -160,6 +160,16 @@ fn las_and_laz_are_read_whatever_extent_they_claim() {
             Err(ImportError::TooMany { .. })
         ));
     }
+    // A layer of 4 GB in a file of some hundred bytes: its size stands behind the first point of 30 bytes and
+    // the number of points, and the chunks behind the place of their table.
+    let lie = las_file(&points, true);
+    let first = u32::from_le_bytes(lie[96..100].try_into().expect("four")) as usize + 8;
+    for layer in 0..9 {
+        let mut lie = lie.clone();
+        let size = first + 34 + 4 * layer;
+        lie[size..size + 4].fill(0xff);
+        assert!(read_bytes(&lie, CloudFormat::Las).is_err(), "layer {layer}");
+    }
     // Points of 65,535 bytes each, of which a piece at once would be 1.3 GB.
     let mut lie = las_file(&points, false);
     lie[105..107].fill(0xff);

@@ -1,0 +1,186 @@
+//! The pieces of wood in a table, each with the one that it grows from: rows of cylinders, and the
+//! segments of a treefile. Their order does not matter.
+
+use super::error::ImportError;
+use super::model_tree::{Edges, MOST_PLACES, Wood};
+use super::sketch::refuse_more;
+use crate::model::{Excitation, SwayColumns};
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+
+/// Numbers up to here name pieces: greater ones are no whole numbers in a table of floats.
+const LARGEST_ID: f64 = 9_007_199_254_740_992.0;
+
+/// A piece of wood.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Segment {
+    pub id: i64,
+    /// The piece that it grows from; `None` on the ground.
+    pub parent: Option<i64>,
+    /// Where it begins if it stands on the ground; `None`: there is only the place where it ends.
+    pub start: Option<Point3<f64>>,
+    pub end: Point3<f64>,
+    pub wood: Wood,
+}
+
+/// The number of a piece; `None` where it is none.
+pub(super) fn id(cell: f64) -> Option<i64> {
+    (cell.fract() == 0.0 && cell.abs() < LARGEST_ID).then_some(cell as i64)
+}
+
+/// What a table says of a piece: its radius, and its sway by the columns of [`SwayColumns`]. Tables do
+/// not say what made it sway, and it counts as wind. What is not known is no number, or nothing above 0.
+pub(super) fn wood(radius: f64, sway: [f64; 6]) -> Wood {
+    Wood {
+        radius: if radius.is_finite() {
+            radius.max(0.0)
+        } else {
+            0.0
+        },
+        sway: SwayColumns::of_values(sway).sway(Excitation::Wind, f64::NAN),
+    }
+}
+
+/// The middle lines of the pieces, each from the end of the one that it grows from: a branch begins
+/// on its carrier's surface or along its way. What stands on the ground is the trunk; of several the
+/// first.
+///
+/// # Errors
+/// Two pieces have the same number, one grows from none of them, or they grow from one another in a
+/// circle.
+pub(super) fn edges(mut segments: Vec<Segment>) -> Result<Edges, ImportError> {
+    refuse_more("pieces", segments.len(), MOST_PLACES / 2)?;
+    segments.sort_by_key(|s| s.id);
+    let twice = segments.windows(2).find(|pair| pair[0].id == pair[1].id);
+    if let Some([one, _]) = twice {
+        return Err(ImportError::bad_format(format!(
+            "two pieces in it have the number {}",
+            one.id
+        )));
+    }
+    let number_of: BTreeMap<i64, usize> = (0..).zip(&segments).map(|(i, s)| (s.id, i)).collect();
+    let mut parents: Vec<Option<usize>> = Vec::with_capacity(segments.len());
+    for own in &segments {
+        let parent = own.parent.map(|parent| {
+            let known = number_of.get(&parent).copied();
+            known.ok_or_else(|| {
+                let id = own.id;
+                ImportError::bad_format(format!(
+                    "piece {id} grows from {parent}, which is not in it"
+                ))
+            })
+        });
+        parents.push(parent.transpose()?);
+    }
+    if let Some(number) = in_circle(&parents) {
+        let id = segments[number].id;
+        return Err(ImportError::bad_format(format!(
+            "piece {id} grows from itself by way of its parents"
+        )));
+    }
+    Ok(joined(&segments, &parents))
+}
+
+/// The edges of pieces that grow from those with these numbers.
+fn joined(segments: &[Segment], parents: &[Option<usize>]) -> Edges {
+    let mut file = Edges::default();
+    let mut begins: Vec<Option<usize>> = Vec::with_capacity(segments.len());
+    let mut ends: Vec<usize> = Vec::with_capacity(segments.len());
+    for own in segments {
+        begins.push(own.start.filter(|_| own.parent.is_none()).map(|start| {
+            file.places.push(start);
+            file.wood.push(Wood {
+                sway: None,
+                ..own.wood
+            });
+            file.places.len() - 1
+        }));
+        ends.push(file.places.len());
+        file.places.push(own.end);
+        file.wood.push(own.wood);
+    }
+    for (number, parent) in parents.iter().enumerate() {
+        let end = ends[number];
+        let begin = parent.map(|p| ends[p]).or(begins[number]);
+        file.edges.extend(begin.map(|begin| [begin, end]));
+        if parent.is_none() {
+            file.foot = file.foot.or(begin).or(Some(end));
+        }
+    }
+    file
+}
+
+/// A piece from which its parents lead back to it; `None` where there is none.
+fn in_circle(parents: &[Option<usize>]) -> Option<usize> {
+    // From which piece on each was come by first.
+    let mut seen_from: Vec<Option<usize>> = vec![None; parents.len()];
+    for first in 0..parents.len() {
+        let mut at = Some(first);
+        while let Some(own) = at {
+            match seen_from[own] {
+                Some(from) if from == first => return Some(own),
+                Some(_) => break,
+                None => seen_from[own] = Some(first),
+            }
+            at = parents[own];
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn segment(id: i64, parent: Option<i64>, end: [f64; 3]) -> Segment {
+        Segment {
+            id,
+            parent,
+            start: Some(Point3::origin()),
+            end: end.into(),
+            wood: wood(0.1 * id as f64, [f64::NAN; 6]),
+        }
+    }
+
+    fn fork() -> Vec<Segment> {
+        vec![
+            segment(1, None, [0.0, 1.0, 0.0]),
+            segment(2, Some(1), [0.0, 2.0, 0.0]),
+            segment(5, Some(2), [1.0, 3.0, 0.0]),
+            segment(7, Some(2), [-1.0, 3.0, 0.0]),
+        ]
+    }
+
+    #[test]
+    fn the_order_of_rows_does_not_matter() {
+        let in_order = edges(fork()).expect("sound");
+        assert_eq!(in_order.edges, [[0, 1], [1, 2], [2, 3], [2, 4]]);
+        assert_eq!(in_order.foot, Some(0));
+        assert_eq!(in_order.wood[3].radius, 0.5);
+        for order in [[3, 2, 1, 0], [2, 0, 3, 1], [1, 3, 0, 2]] {
+            let segments = order.map(|i| fork()[i]).to_vec();
+            assert_eq!(edges(segments).as_ref(), Ok(&in_order), "{order:?}");
+        }
+    }
+
+    #[test]
+    fn parents_that_are_none_are_refused() {
+        let mut circle = fork();
+        circle[1].parent = Some(5);
+        let mut unknown = fork();
+        unknown[3].parent = Some(4);
+        let mut twice = fork();
+        twice[2].id = 2;
+        let mut own = fork();
+        own[0].parent = Some(1);
+        for (bad, expected) in [
+            (circle, "piece 2 grows from itself"),
+            (unknown, "piece 7 grows from 4, which is not in it"),
+            (twice, "two pieces in it have the number 2"),
+            (own, "piece 1 grows from itself"),
+        ] {
+            let said = edges(bad).expect_err("no tree").to_string();
+            assert!(said.contains(expected), "{said}");
+        }
+    }
+}
