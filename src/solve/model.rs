@@ -5,7 +5,7 @@ use super::bent_tree::Names;
 use super::clear::{Turns, clear_of_filmed};
 use super::lift::{assign_radii, flat};
 use super::sub_branches::{self, SubBranch};
-use super::taper::taper;
+use super::taper::{taper, within_pipes};
 use crate::config::{Affinity, Config};
 use crate::hierarchy::Evidence;
 use crate::model::{
@@ -231,7 +231,12 @@ impl Model {
         // Radii that are seen go before those of the pipe model, and a width that the user gives
         // before both.
         if config.wood.trunk_width_px <= 0.0 {
-            taper(&mut joined.skeleton.nodes, &joined.seen_px);
+            let nodes = &mut joined.skeleton.nodes;
+            let seen_px = match self.is_bare() {
+                true => within_pipes(nodes, &joined.seen_px),
+                false => joined.seen_px,
+            };
+            taper(nodes, &seen_px);
         }
         joined.skeleton
     }

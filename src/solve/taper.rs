@@ -44,8 +44,7 @@ impl Stretch {
 /// What is not seen is no thinner than what grows from it, and no branch is thicker than what it
 /// grows from.
 pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
-    let seen_px = within_pipes(nodes, seen_px);
-    let seen = |i: usize| seen_px[i];
+    let seen = |i: usize| seen_px.get(i).copied().flatten();
     for axis in axes(nodes) {
         let on_wood: Vec<usize> = axis
             .iter()
@@ -81,9 +80,9 @@ pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
     }
 }
 
-/// What is seen, but no thicker than the pipe model allows, whose constant is the median over this
-/// tree's wood; one a node.
-fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Option<f64>> {
+/// The radii that are seen, px, by node, but no thicker than the pipe model allows, whose constant is the median
+/// over this tree's wood. All of its wood must be seen: limbs of a tree in leaf bear more than what is.
+pub(super) fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut borne_px: Vec<f64> = (0..nodes.len()).map(|i| edge_px(nodes, i)).collect();
     for i in (1..nodes.len()).rev() {
         if let Some(parent) = nodes[i].parent.map(NodeId::index).filter(|p| *p < i) {
@@ -255,7 +254,7 @@ mod tests {
         assert_eq!(within[1..5], seen_px[1..5]);
         let tip_px = within[7].expect("a radius");
         assert!((3.0..5.5).contains(&tip_px), "{tip_px}");
-        taper(&mut nodes, &seen_px);
+        taper(&mut nodes, &within);
         assert!(nodes[7].radius <= tip_px, "{:?}", radii(&nodes));
     }
 
