@@ -419,9 +419,10 @@ fn new_trees_stand_in_space_as_the_example_does() {
     let more = ["--count", "20", "--seed", "9", "--motion", "none"];
     let trees = grown(&out, &more);
     let document = Document::read(example(), 0.0).expect("a capture");
-    let config = &document.note.config;
+    let mut config = document.note.config.clone();
+    config.shape.planes = config.shape.planes_of(document.note.is_of_bare());
     let outline = example_outline(&document).expect("an outline");
-    let stood = reshape(&document.skeleton, outline, config);
+    let stood = reshape(&document.skeleton, outline, &config);
     let places: Vec<_> = stood.nodes.iter().map(|n| n.position).collect();
     let envelope = Envelope::of_filmed(config.shape.envelope, outline, stood.foot_px, &places);
     let attractors = config.shape.attractors as usize;
