@@ -12,7 +12,7 @@ const ON_WOOD_CELLS: f64 = 0.5;
 /// ... or than the share of its radius by which wood is not round.
 const OUT_OF_ROUND: f64 = 0.25;
 /// The foot is the lowest part of the trunk, this share of the tree's height ...
-const FOOT_SHARE: f64 = 0.15;
+pub(super) const FOOT_SHARE: f64 = 0.15;
 /// ... and in it the lowest circles say how thick it is.
 const FOOT_CIRCLES: usize = 5;
 /// A branch is large if it is at least this share of the tree's height long: shoots at the foot are not.

@@ -89,22 +89,23 @@ mod tests {
         read_wood(dir.path())
     }
 
+    fn wood_of(bare: bool, nodes: Vec<WoodNode>) -> Arc<Wood> {
+        Arc::new(Wood {
+            branches: BranchGraph { nodes },
+            bare,
+            ..Wood::default()
+        })
+    }
+
     #[test]
     fn what_was_written_is_read() {
-        let of = |bare, nodes| {
-            Arc::new(Wood {
-                branches: BranchGraph { nodes },
-                bare,
-                ..Wood::default()
-            })
-        };
         let nodes = vec![
             WoodNode::made_up(None, 100.0, 200.5),
             WoodNode::made_up(Some(0), 101.123_456_789, 150.0),
             WoodNode::made_up(Some(0), 90.0, 120.0),
         ];
         let later = vec![WoodNode::made_up(None, 0.1 + 0.2, 1.0 / 3.0)];
-        let (wood, later) = (of(false, nodes), of(true, later));
+        let (wood, later) = (wood_of(false, nodes), wood_of(true, later));
         let seen = WoodSeen::from([(90, wood), (170, later)]);
         let text = wood_csv(&seen).expect("a table");
         assert_eq!(read(&text).expect("wood"), seen);

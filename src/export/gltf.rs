@@ -244,11 +244,11 @@ fn push_wood(
     };
     let bark = bark(root, buffer, &model.dressed.bark)?;
     let material = root.push(bark.clone());
-    let (seen, made_up) = (mesh.part(false), mesh.part(true));
-    if !is_drawn(&seen) || !is_drawn(&made_up) {
+    if !mesh.is_made_up_in_part() {
         let what = MeshPart::wood(mesh, material, skin);
         return Ok(vec![push_skinned(root, buffer, model.scale(), &[what])?]);
     }
+    let (seen, made_up) = (mesh.part(false), mesh.part(true));
     // It looks the same; with a material of its own it can be hidden.
     let of_made_up = root.push(Material {
         name: Some(MADE_UP_BARK.to_owned()),

@@ -31,6 +31,12 @@ impl Mesh {
         self.made_up.resize(self.indices.len() / 3, made_up);
     }
 
+    /// Whether some triangles are made up, and others are not.
+    pub fn is_made_up_in_part(&self) -> bool {
+        let all = self.made_up.iter().all(|made_up| *made_up);
+        !all && self.made_up.contains(&true)
+    }
+
     /// The triangles that are made up, or the others, with their vertices alone.
     pub fn part(&self, made_up: bool) -> Self {
         let mut part = Self::default();

@@ -72,8 +72,8 @@ pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
     // Where numbers count from 1, the parent of what stands on the ground is 0.
     let counts_from_0 = rows.iter().any(|row| row.id == 0);
     for row in &mut rows {
-        let on_ground = |parent: &i64| *parent < 0 || (*parent == 0 && !counts_from_0);
-        row.parent = row.parent.filter(|parent| !on_ground(parent));
+        let first = if counts_from_0 { 0 } else { 1 };
+        row.parent = row.parent.filter(|parent| *parent >= first);
     }
     segments::edges(rows)
 }

@@ -52,6 +52,11 @@ pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
     segments::edges(segments)
 }
 
+/// The number of a segment in a column; no number where there is no such column.
+fn known(row: &[f64], column: Option<usize>) -> f64 {
+    column.map_or(f64::NAN, |column| row[column])
+}
+
 /// The cells of a line; one behind the last comma may be empty.
 fn cells(line: &str) -> impl Iterator<Item = &str> {
     line.trim().trim_end_matches(',').split(',').map(str::trim)
@@ -85,13 +90,15 @@ impl Columns {
         }
         let mut segments = Vec::with_capacity(rows.len());
         for (number, row) in (0..).zip(rows) {
-            let cell = |column: Option<usize>| column.map_or(f64::NAN, |column| row[column]);
             segments.push(Segment {
                 id: number,
                 parent: Some(segments::id(row[self.parent])?).filter(|parent| *parent >= 0),
                 start: None,
                 end: from_z_up(self.place.map(|column| row[column])),
-                wood: segments::wood(cell(self.radius), self.sway.map(cell)),
+                wood: segments::wood(
+                    known(row, self.radius),
+                    self.sway.map(|column| known(row, column)),
+                ),
             });
         }
         Some(segments)

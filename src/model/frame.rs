@@ -225,10 +225,6 @@ pub struct Rgb {
     pub pixels: Vec<u8>,
 }
 
-fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
-    red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
-}
-
 /// Brightness of a colour (ITU-R BT.601, the weights that JPEG and YUYV are made with).
 pub fn brightness(colour: [u8; 3]) -> u8 {
     let [r, g, b] = colour.map(u32::from);
@@ -239,6 +235,10 @@ pub fn brightness(colour: [u8; 3]) -> u8 {
 /// picture may be off. A picture has colours if this share of it has one.
 const GREY_LEVELS: u8 = 4;
 const COLOUR_SHARE: f64 = 0.001;
+
+fn is_coloured([red, green, blue]: [u8; 3]) -> bool {
+    red.max(green).max(blue) - red.min(green).min(blue) > GREY_LEVELS
+}
 
 impl Rgb {
     /// Whether it is more than grey.

@@ -173,7 +173,8 @@ impl Skeleton {
     pub fn without_copies(&self) -> Self {
         Self {
             nodes: self.nodes[..self.measured()].to_vec(),
-            ..self.clone()
+            foot_px: self.foot_px,
+            image_size: self.image_size,
         }
     }
 

@@ -44,7 +44,7 @@ impl Stretch {
 /// What is not seen is no thinner than what grows from it, and no branch is thicker than what it
 /// grows from.
 pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
-    let seen = |i: usize| seen_px.get(i).copied().flatten();
+    let seen = |i: usize| seen_at(seen_px, i);
     for axis in axes(nodes) {
         let on_wood: Vec<usize> = axis
             .iter()
@@ -80,6 +80,11 @@ pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
     }
 }
 
+/// The radius that is seen at a node, px; a tree without wood has none.
+fn seen_at(seen_px: &[Option<f64>], node: usize) -> Option<f64> {
+    seen_px.get(node).copied().flatten()
+}
+
 /// The radii that are seen, px, by node, but no thicker than the pipe model allows, whose constant is the median
 /// over this tree's wood. All of its wood must be seen: limbs of a tree in leaf bear more than what is.
 pub(super) fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Option<f64>> {
@@ -96,7 +101,7 @@ pub(super) fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Optio
         // At the middle of the edge; a tip bears leaves.
         let borne_px = borne_px - 0.5 * length_px + TIP_BORNE_PX;
         let pipe_px = borne_px.powf(PIPE_POWER);
-        constants.extend(seen_px.get(i).copied().flatten().map(|seen_px| Measure {
+        constants.extend(seen_at(seen_px, i).map(|seen_px| Measure {
             radius_px: seen_px / pipe_px,
             length_px,
         }));
@@ -105,8 +110,7 @@ pub(super) fn within_pipes(nodes: &[Node], seen_px: &[Option<f64>]) -> Vec<Optio
     let most = WITHIN_PIPES * weighted_median(constants);
     let mut within = Vec::with_capacity(nodes.len());
     for (i, pipe_px) in pipes_px.into_iter().enumerate() {
-        let seen_px = seen_px.get(i).copied().flatten();
-        within.push(seen_px.map(|px| px.min(most * pipe_px)));
+        within.push(seen_at(seen_px, i).map(|px| px.min(most * pipe_px)));
     }
     within
 }

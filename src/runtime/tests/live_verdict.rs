@@ -160,18 +160,22 @@ fn a_verdict_costs_little_however_long_the_film_is() {
 /// What the camera was away before points were followed is not taken off their film.
 #[test]
 fn absences_count_from_where_points_are_followed() {
-    let camera = |reconnects, away_s| CameraState {
-        reconnects,
-        away_s,
-        ..CameraState::default()
-    };
     let mut film = Film::new(4, 10.0);
-    film.quality = Quality::from_now(&camera(2, 30.0));
+    film.quality = Quality::from_now(&away(2, 30.0));
     film.film(11.0);
-    for (state, seconds) in [(camera(2, 30.0), 11.0), (camera(3, 34.0), 7.0)] {
+    for (state, seconds) in [(away(2, 30.0), 11.0), (away(3, 34.0), 7.0)] {
         let length = film.quality.length(&state);
         assert!((length.seconds - seconds).abs() < 0.05, "{length:?}");
         assert!(length.rate_hz.is_some());
     }
-    assert_eq!(film.quality.length(&camera(9, 90.0)).rate_hz, None);
+    assert_eq!(film.quality.length(&away(9, 90.0)).rate_hz, None);
+}
+
+/// A camera that was away so often, and so long in all.
+fn away(reconnects: u64, away_s: f64) -> CameraState {
+    CameraState {
+        reconnects,
+        away_s,
+        ..CameraState::default()
+    }
 }
