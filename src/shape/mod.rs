@@ -39,7 +39,7 @@ pub use keep::{Twin, on_foot, twins};
 pub use limb::{CenterlineSample, Limb};
 pub use limbs::{limbs, thicken};
 pub use measure::{PushFigures, side_symmetry};
-pub use okabe::{set_depths_apart, set_depths_seen};
+pub use okabe::{set_depths_apart, set_depths_seen, set_side_depths_apart};
 pub use planes::copy_to_planes;
 pub use prototype::{Prototype, Tuned, build, build_like, build_seen};
 pub use push::{PositionPrior, Terms, envelope_distance, push, push_on};

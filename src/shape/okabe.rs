@@ -2,12 +2,15 @@
 //! sect. 3.1 use it): the other way than the push from a flat tree to one in space.
 
 use crate::model::{MovingBranch, NodeId, Skeleton};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 /// Directions that are tried, evenly from the steepest towards the viewer to the steepest away.
 const DIRECTIONS: i32 = 36;
 /// The steepest, degrees out of the plane of the picture.
 const STEEPEST_DEG: f64 = 60.0;
+/// The steepest of side wood: no deeper than it is long in the picture. With 60 degrees the crowns of nine
+/// made bare trees were 1.7 times as deep as the true ones, with 45 degrees 1.1 times, without any 0.8.
+const STEEPEST_SIDE_DEG: f64 = 45.0;
 /// Shares of a branch's length at which it is looked at how near others are.
 const LOOKED_AT: [f64; 2] = [0.5, 1.0];
 /// Places along a branch that others keep away from.
@@ -26,7 +29,10 @@ pub fn set_depths_apart(tree: &mut Skeleton, trunk: &[bool]) {
         let is_trunk = trunk.get(branch.node.index()).is_some_and(|is_in| *is_in);
         let slope = match is_trunk {
             true => 0.0,
-            false => most_apart(tree, &branch, &lengths_px, &placed),
+            false => {
+                let way = Way::of(tree, &branch, &lengths_px);
+                way.most_apart(STEEPEST_DEG, &placed)
+            }
         };
         let from_z = tree.nodes[branch.begin.index()].position.z;
         for part in &lengths_px {
@@ -36,8 +42,109 @@ pub fn set_depths_apart(tree: &mut Skeleton, trunk: &[bool]) {
             tree.nodes[branch.begin.index()].position,
             branch.vector(tree),
         );
-        placed.extend((1..=SAMPLES).map(|k| from + way * (f64::from(k) / f64::from(SAMPLES))));
+        placed.extend(samples(from, way));
     }
+}
+
+/// Gives side wood, which was flat, the depth that makes its least distance to all that has one the
+/// greatest, stroke by stroke: a stroke goes on along the side wood that reaches farthest. Places in the
+/// picture stay; what hangs on side wood goes along. `tree` has no copies.
+pub fn set_side_depths_apart(tree: &mut Skeleton) {
+    let mut is_side = vec![false; tree.nodes.len()];
+    for (i, is_side) in is_side.iter_mut().enumerate() {
+        let node = NodeId(i as u32);
+        *is_side = tree.mover(node) != node && !tree.is_bend(node);
+    }
+    if !is_side.contains(&true) {
+        return;
+    }
+    let strokes = side_strokes(tree, &is_side);
+    let flat = tree.clone();
+    let mut placed: Vec<Point3<f64>> = Vec::new();
+    for (node, is_side) in flat.nodes.iter().zip(&is_side) {
+        if let Some(parent) = node.parent.filter(|_| !is_side) {
+            let from = flat.nodes[parent.index()].position;
+            placed.extend(samples(from, node.position - from));
+        }
+    }
+    let mut slopes = vec![0.0; flat.nodes.len()];
+    for i in 1..flat.nodes.len() {
+        let Some(parent) = flat.nodes[i].parent.map(|p| p.index()) else {
+            continue;
+        };
+        let piece = flat.nodes[i].position - flat.nodes[parent].position;
+        if let Some(stroke) = strokes
+            .iter()
+            .find(|stroke| stroke.nodes.first() == Some(&i))
+        {
+            let from = tree.nodes[parent].position;
+            let way = Way {
+                from,
+                flat: (flat.nodes[stroke.end()].position - flat.nodes[parent].position).xy(),
+                length_px: stroke.length_px,
+            };
+            let slope = way.most_apart(STEEPEST_SIDE_DEG, &placed);
+            placed.extend(samples(from, way.at_slope(slope)));
+            for node in &stroke.nodes {
+                slopes[*node] = slope;
+            }
+        }
+        tree.nodes[i].position.z =
+            tree.nodes[parent].position.z + piece.z + slopes[i] * piece.xy().norm();
+    }
+}
+
+/// Side wood from where it leaves to a tip.
+struct SideStroke {
+    nodes: Vec<usize>,
+    /// In the picture.
+    length_px: f64,
+}
+
+impl SideStroke {
+    fn end(&self) -> usize {
+        self.nodes.last().copied().unwrap_or(0)
+    }
+}
+
+/// The strokes of side wood, each after the one that it leaves.
+fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
+    let piece_px = |i: usize| {
+        let node = &tree.nodes[i];
+        let below = node.parent.map_or(node, |p| &tree.nodes[p.index()]);
+        (node.position - below.position).xy().norm()
+    };
+    // How far side wood reaches from each node on, and by which child it reaches farthest.
+    let mut farthest: Vec<(f64, Option<usize>)> = vec![(0.0, None); tree.nodes.len()];
+    for i in (1..tree.nodes.len()).rev().filter(|i| is_side[*i]) {
+        let reach_px = piece_px(i) + farthest[i].0;
+        if let Some(parent) = tree.nodes[i].parent.map(|p| p.index())
+            && reach_px >= farthest[parent].0
+        {
+            farthest[parent] = (reach_px, Some(i));
+        }
+    }
+    let mut strokes = Vec::new();
+    for i in (1..tree.nodes.len()).filter(|i| is_side[*i]) {
+        let parent = tree.nodes[i].parent.map_or(0, |p| p.index());
+        if is_side[parent] && farthest[parent].1 == Some(i) {
+            continue;
+        }
+        let mut nodes = vec![i];
+        while let Some(next) = farthest[nodes[nodes.len() - 1]].1 {
+            nodes.push(next);
+        }
+        strokes.push(SideStroke {
+            length_px: nodes.iter().map(|node| piece_px(*node)).sum(),
+            nodes,
+        });
+    }
+    strokes
+}
+
+/// Places along a straight way.
+fn samples(from: Point3<f64>, way: Vector3<f64>) -> impl Iterator<Item = Point3<f64>> {
+    (1..=SAMPLES).map(move |k| from + way * (f64::from(k) / f64::from(SAMPLES)))
 }
 
 /// Gives every measured branch whose end a depth camera has seen that depth, evenly along its way from
@@ -82,37 +189,53 @@ fn lengths_px(tree: &Skeleton, branch: &MovingBranch) -> Vec<Part> {
     parts
 }
 
-/// Depth for each pixel of length at which a branch is farthest from all that is placed; the
-/// flattest of equals.
-fn most_apart(
-    tree: &Skeleton,
-    branch: &MovingBranch,
-    parts: &[Part],
-    placed: &[Point3<f64>],
-) -> f64 {
-    let from = tree.nodes[branch.begin.index()].position;
-    let flat = tree.nodes[branch.node.index()].position.xy() - from.xy();
-    let own = parts.iter().find(|part| part.node == branch.node);
-    let length_px = own.map_or(0.0, |part| part.length_px);
-    let (mut best, mut most_sq) = (0.0, f64::NEG_INFINITY);
-    for k in 0..=DIRECTIONS {
-        // 0, then to and fro, ever steeper.
-        let step = (k + 1) / 2 * if k % 2 == 0 { 1 } else { -1 };
-        let angle_deg = STEEPEST_DEG * f64::from(step) / f64::from(DIRECTIONS / 2);
-        let slope = angle_deg.to_radians().tan();
-        let way = Vector3::new(flat.x, flat.y, slope * length_px);
-        let least_sq = LOOKED_AT
-            .iter()
-            .flat_map(|share| {
-                let at = from + *share * way;
-                placed.iter().map(move |other| (other - at).norm_squared())
-            })
-            .fold(f64::INFINITY, f64::min);
-        if least_sq > most_sq + 1e-6 {
-            (best, most_sq) = (slope, least_sq);
+/// The way of a branch in the picture, and where it begins in space.
+struct Way {
+    from: Point3<f64>,
+    flat: Vector2<f64>,
+    /// Along its bends.
+    length_px: f64,
+}
+
+impl Way {
+    fn of(tree: &Skeleton, branch: &MovingBranch, parts: &[Part]) -> Self {
+        let [from, end] = [branch.begin, branch.node].map(|n| tree.nodes[n.index()].position);
+        let own = parts.iter().find(|part| part.node == branch.node);
+        Self {
+            from,
+            flat: (end - from).xy(),
+            length_px: own.map_or(0.0, |part| part.length_px),
         }
     }
-    best
+
+    /// The way in space with so much depth for each pixel of length.
+    fn at_slope(&self, slope: f64) -> Vector3<f64> {
+        Vector3::new(self.flat.x, self.flat.y, slope * self.length_px)
+    }
+
+    /// Depth for each pixel of length at which it is farthest from all that is placed, no steeper than
+    /// so many degrees; the flattest of equals.
+    fn most_apart(&self, steepest_deg: f64, placed: &[Point3<f64>]) -> f64 {
+        let (mut best, mut most_sq) = (0.0, f64::NEG_INFINITY);
+        for k in 0..=DIRECTIONS {
+            // 0, then to and fro, ever steeper.
+            let step = (k + 1) / 2 * if k % 2 == 0 { 1 } else { -1 };
+            let angle_deg = steepest_deg * f64::from(step) / f64::from(DIRECTIONS / 2);
+            let slope = angle_deg.to_radians().tan();
+            let way = self.at_slope(slope);
+            let least_sq = LOOKED_AT
+                .iter()
+                .flat_map(|share| {
+                    let at = self.from + *share * way;
+                    placed.iter().map(move |other| (other - at).norm_squared())
+                })
+                .fold(f64::INFINITY, f64::min);
+            if least_sq > most_sq + 1e-6 {
+                (best, most_sq) = (slope, least_sq);
+            }
+        }
+        best
+    }
 }
 
 #[cfg(test)]
@@ -149,5 +272,49 @@ mod tests {
                 assert!((a - b).norm() > 40.0, "{ends:?}");
             }
         }
+    }
+
+    /// A limb with side wood of two pieces along it, of which the first carries a branch and a twig.
+    #[test]
+    fn side_wood_gets_depth_and_takes_along_what_hangs_on_it() {
+        let mut tree = Skeleton::forked();
+        let limb = NodeId(2);
+        for (name, parent, at, rides) in [
+            (20, 2, [-60.0, 175.0, 0.0], true),
+            (21, 4, [-80.0, 195.0, 0.0], true),
+            (22, 4, [-75.0, 170.0, 9.0], false),
+            (23, 4, [-60.0, 182.0, 0.0], true),
+        ] {
+            let mut node = Node::made_up(name, Some(parent), at);
+            node.moves_with = rides.then_some(limb);
+            tree.nodes.push(node);
+        }
+        let flat = tree.clone();
+        set_side_depths_apart(&mut tree);
+        for (node, before) in tree.nodes.iter().zip(&flat.nodes) {
+            assert_eq!(node.position.xy(), before.position.xy());
+        }
+        let depths: Vec<f64> = tree.nodes.iter().map(|n| n.position.z).collect();
+        assert_eq!(depths[..4], [0.0; 4]);
+        let slope = |from: usize, to: usize| {
+            let way = flat.nodes[to].position - flat.nodes[from].position;
+            (depths[to] - depths[from]) / way.xy().norm()
+        };
+        let steepest = STEEPEST_SIDE_DEG.to_radians().tan();
+        // Both pieces of the stroke have one slope, and the branch keeps its own depth on it.
+        assert!(depths[4] != 0.0 && slope(2, 4).abs() <= steepest + 1e-9);
+        assert!((slope(2, 4) - slope(4, 5)).abs() < 1e-9, "{depths:?}");
+        assert!((depths[6] - depths[4] - 9.0).abs() < 1e-9, "{depths:?}");
+        // The twig parts from what it lies along.
+        assert!((slope(4, 7) - slope(4, 5)).abs() > 0.1, "{depths:?}");
+    }
+
+    #[test]
+    fn a_tree_without_side_wood_stays_as_it_is() {
+        let mut tree = one_sided(2);
+        tree.nodes[2].position.z = 7.0;
+        let before = tree.clone();
+        set_side_depths_apart(&mut tree);
+        assert_eq!(tree, before);
     }
 }

@@ -9,6 +9,8 @@ use crate::config;
 use crate::model::Skeleton;
 use nalgebra::{Point3, Vector3};
 
+/// The steepest branch to its plane, degrees: hardly any is seen from its end (docs/method.md).
+const STEEPEST_DEG: f64 = 70.0;
 /// How much farther a way counts that is seen in the picture.
 const SEEN: f64 = 3.0;
 
@@ -329,9 +331,16 @@ impl<'a> Pusher<'a> {
         candidates
     }
 
-    /// Outside of the envelope the probability is 0, and for the pushes that it leaves to the
-    /// children beyond delta as well, unless they get smaller.
+    /// Outside of the envelope the probability is 0, for the pushes that it leaves to the children
+    /// beyond delta as well, unless they get smaller, and for a branch that is steeper to its plane
+    /// than [`STEEPEST_DEG`].
     fn is_possible(&self, step: &Step, push: f64) -> bool {
+        let nodes = &self.skeleton.nodes;
+        let way = nodes[step.node].position - nodes[step.parent].position;
+        let in_plane = way - step.normal * way.dot(&step.normal);
+        if push.abs() > STEEPEST_DEG.to_radians().tan() * in_plane.norm() {
+            return false;
+        }
         let offset = step.offset(push);
         for &k in step.moved {
             let position = self.skeleton.nodes[k].position + offset;

@@ -47,6 +47,7 @@ pub(super) fn along_wood(
     build.measured();
     build.side_wood();
     build.set_levels();
+    build.tree.set_side_depths(skeleton);
     build.tree.copy_into_planes(plain, skeleton, names);
     build.settle_unseen();
     build.name(names);

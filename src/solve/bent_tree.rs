@@ -1,6 +1,7 @@
 //! A tree whose branches have bends, put together node by node, and its copies.
 
 use crate::model::{Node, NodeId, NodeName, Skeleton};
+use crate::shape::set_side_depths_apart;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Names for nodes that no tree before had.
@@ -51,6 +52,17 @@ impl BentTree {
         self.seen_px.push(seen_px);
         self.share.push(share);
         place
+    }
+
+    /// Gives side wood a depth, which goes by no push. `straight` is the tree with straight branches.
+    pub fn set_side_depths(&mut self, straight: &Skeleton) {
+        let mut tree = Skeleton {
+            nodes: std::mem::take(&mut self.nodes),
+            foot_px: straight.foot_px,
+            image_size: straight.image_size,
+        };
+        set_side_depths_apart(&mut tree);
+        self.nodes = tree.nodes;
     }
 
     /// Adds the copies that `plain` has of its branches, each along the wood of its original turned into

@@ -8,6 +8,7 @@ use crate::model::{NodeId, Skeleton};
 pub fn in_depth_of(straight: &Skeleton, along: &Skeleton, first_name: u32) -> Skeleton {
     let mut tree = BentTree::on_foot_of(straight);
     push_measured(&mut tree, straight, along);
+    tree.set_side_depths(straight);
     let mut names = Names {
         next: first_name,
         prior: None,
