@@ -399,7 +399,7 @@ mod tests {
                 tree.push(new_node(Some(leaf), level, end));
             }
         }
-        ForkStatistics::of_tree(&tree, FOOT - Vector2::new(0.0, 50.0)).expect("forks")
+        ForkStatistics::of_tree(&tree).expect("forks")
     }
 
     fn grown(seed: u64) -> Vec<Node2d> {
@@ -478,7 +478,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_grown_is_an_error() {
-        let few = ForkStatistics::of_tree(&[new_node(None, 0, FOOT)], FOOT);
+        let few = ForkStatistics::of_tree(&[new_node(None, 0, FOOT)]);
         assert_eq!(few, Err(GrowError::TooFewForks { found: 0 }));
         let mut random = generator(1, 0);
         let mut empty = region();

@@ -11,7 +11,7 @@ use crate::skeleton::Node2d;
 use nalgebra::{Point2, Vector2};
 
 /// An example with fewer forks says nothing on what forks are like.
-pub const FEWEST_FORKS: usize = 3;
+pub(super) const FEWEST_FORKS: usize = 3;
 
 /// What an example says on the form of trees like it.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,14 +59,11 @@ impl ForkStatistics {
     /// # Errors
     /// It has fewer than [`FEWEST_FORKS`] forks.
     pub fn of(skeleton: &Skeleton) -> Result<Self, GrowError> {
-        let top = skeleton.measured_branches().next().unwrap_or_default();
-        let top = skeleton.nodes.get(top.index());
-        let top_px = top.map_or(skeleton.foot_px, |n| skeleton.image_from_model(&n.position));
-        Self::of_tree(&fork_tree(skeleton), top_px)
+        Self::of_tree(&fork_tree(skeleton))
     }
 
-    /// Of a flat tree of forks and tips with the trunk's top there, px.
-    pub(super) fn of_tree(tree: &[Node2d], top_px: Point2<f64>) -> Result<Self, GrowError> {
+    /// Of a flat tree of forks and tips.
+    pub(super) fn of_tree(tree: &[Node2d]) -> Result<Self, GrowError> {
         let children = children(tree);
         let carried = carried_forks(tree, &children);
         let forks = forks(tree, &children, &carried);
@@ -81,7 +78,7 @@ impl ForkStatistics {
         let (Some(alike), Some(leading_left)) = (alike, led) else {
             return Err(few);
         };
-        let trunk = Trunk::of(tree, &children, top_px);
+        let trunk = Trunk::of(tree, &children);
         let [leading, others] = directions(tree, &children, &carried);
         Ok(Self {
             alike,
@@ -168,25 +165,26 @@ struct Trunk {
 }
 
 impl Trunk {
-    /// Up to the main fork: of those up to the trunk's top that are met with on the way along the
-    /// branch that carries most, the one at which the second branch carries most, the lowest of
-    /// equals; else to the top. Twigs that leave the trunk do not end it.
-    fn of(tree: &[Node2d], children: &[Vec<usize>], top_px: Point2<f64>) -> Self {
+    /// Up to the main fork: of those that are met with on the way along the branch that carries most,
+    /// the one at which the second branch carries most, the lowest of equals; without any to the top.
+    /// Twigs that leave the trunk do not end it.
+    fn of(tree: &[Node2d], children: &[Vec<usize>]) -> Self {
         let carried = with_all_above(tree, vec![1; tree.len()]);
-        let (mut most, mut end_px, mut main_fork) = (0, top_px, None);
+        let (mut most, mut main_fork, mut top) = (0, None, 0);
         let mut at = (!tree.is_empty()).then_some(0);
         while let Some(node) = at {
             let mut own = children[node].clone();
             own.sort_by_key(|child| std::cmp::Reverse((carried[*child], *child)));
             let second = own.get(1).map_or(0, |child| carried[*child]);
-            let here = tree[node].position_px;
-            if node > 0 && second > most && here.y >= top_px.y - 1.0 {
-                (most, end_px, main_fork) = (second, here, Some(node));
+            if node > 0 && second > most {
+                (most, main_fork) = (second, Some(node));
             }
+            top = node;
             at = own.first().copied();
         }
-        let foot_px = tree.first().map_or(end_px, |foot| foot.position_px);
-        let to_fork_px = end_px - foot_px;
+        let place_px = |node: usize| tree.get(node).map_or(Point2::origin(), |n| n.position_px);
+        let end_px = place_px(main_fork.unwrap_or(top));
+        let to_fork_px = end_px - place_px(0);
         let branches = main_fork.map_or(&[][..], |node| &children[node]);
         let lengths_px = branches
             .iter()
