@@ -47,7 +47,7 @@ pub use back::{BackEnd, Followed, Moved};
 pub use certainty::Certainty;
 #[cfg(feature = "camera")]
 pub use decode::{DecodeStage, Undecoded};
-pub use drawn::stand_drawn;
+pub use drawn::{stand_drawn, thickened};
 pub use dress::{dress, flutter};
 pub use film_log::{FilmLog, KeptFrame};
 #[cfg(feature = "opencv")]

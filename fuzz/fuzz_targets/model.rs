@@ -1,7 +1,7 @@
 //! Any bytes as a modelled tree, of the kind that the first one says.
 #![no_main]
 
-use arborcam::import::{FlatModel, read_model};
+use arborcam::import::{StandingModel, read_model};
 use std::path::Path;
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
@@ -12,5 +12,5 @@ libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
         Some(b'#' | b'h' | b'x') => "fuzz.txt",
         _ => "fuzz.obj",
     };
-    let _ = read_model(bytes, Path::new(name)).map(|model| FlatModel::of(&model.tree, 3));
+    let _ = read_model(bytes, Path::new(name)).map(|model| StandingModel::of(&model.tree));
 });

@@ -12,7 +12,7 @@ use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cl
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::refuse_taken;
-use crate::import::{CloudFormat, CloudRead, FlatTree, ImportError, Units, read_cloud};
+use crate::import::{CloudFormat, CloudRead, ImportError, Units, cover_px, read_cloud};
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
@@ -231,13 +231,8 @@ impl Scan {
     /// The tree as a document.
     fn drawn(&self, tree: &CloudTree) -> anyhow::Result<DrawnTree> {
         let scaled = stand_scanned(tree);
-        let flat = FlatTree {
-            skeleton: scaled.skeleton.clone(),
-            has_radii: true,
-            trunk_px: Vec::new(),
-            crown_px: Vec::new(),
-        };
-        let region = outline::covered(&flat.cover_px(), scaled.skeleton.image_size)?;
+        let size = scaled.skeleton.image_size;
+        let region = outline::covered(&cover_px(&scaled.skeleton), size)?;
         let (name, config) = (self.name.clone(), self.config.clone());
         Ok(DrawnTree::scanned(
             name,

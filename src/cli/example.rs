@@ -5,11 +5,14 @@ use super::output::eprint_line;
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::read_bounded;
-use crate::grow::FEWEST_FORKS;
-use crate::import::{FlatModel, FlatTree, ImportError, joined, read_model, read_sketch};
+use crate::import::{
+    FlatTree, ImportError, StandingModel, cover_px, joined, read_model, read_sketch,
+};
+use crate::model::{Outline, Size};
 use crate::outline;
-use crate::views::DrawnTree;
+use crate::views::{DrawnTree, modelled_defaults};
 use anyhow::{Context, anyhow};
+use nalgebra::Point2;
 use std::path::Path;
 
 /// Largest drawing or model that is read, bytes.
@@ -34,13 +37,13 @@ impl Example {
             let document = Document::read(path, config.export.animation_s)?;
             return Ok(Self { document, config });
         }
-        let config = Config::default().layered(settings, |_| {})?;
         let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
         let mut document = if ["svg", "json"].map(Some).contains(&ending.to_str()) {
+            let config = Config::default().layered(settings, |_| {})?;
             let flat = read_drawing(path)?;
             stood_up(path, &flat, config)?.document(&[], Vec::new())?
         } else {
-            modelled(path, config)?
+            modelled(path, settings)?
         };
         // It is in no folder, and the file holds no others.
         document.dir = path.to_owned();
@@ -49,28 +52,24 @@ impl Example {
     }
 }
 
-/// The document of a modelled tree. Where those of its limbs that are to be copied have too few forks
-/// to learn from, all of them are taken, and not copied.
-fn modelled(path: &Path, mut config: Config) -> Result<Document, CommandError> {
+/// The document of a modelled tree.
+fn modelled(path: &Path, settings: Option<&Path>) -> Result<Document, CommandError> {
     let bytes = read_file(path)?;
     let model = read_model(&bytes, path).map_err(|e| unfit(path, e))?;
-    let mut made_flat = FlatModel::of(&model.tree, config.shape.planes);
-    if made_flat
-        .as_ref()
-        .is_ok_and(|made| made.flat.forks() < FEWEST_FORKS)
-    {
-        config.shape.planes = 1;
-        made_flat = FlatModel::of(&model.tree, 1);
-    }
-    let made_flat = made_flat.map_err(|e| unfit(path, e))?;
-    config.export.metres_per_px = made_flat.metres_per_px;
-    let tree = stood_up(path, &made_flat.flat, config)?;
+    let standing = StandingModel::of(&model.tree).map_err(|e| unfit(path, e))?;
+    let config = modelled_defaults(&standing).layered(settings, |_| {})?;
+    let region = region(
+        path,
+        &cover_px(&standing.skeleton),
+        standing.skeleton.image_size,
+    )?;
+    let tree = DrawnTree::modelled(short_name(path), &standing, &region, config);
     let mut poses = Vec::with_capacity(model.poses.len());
     for (frame, places) in (0_u64..).zip(&model.poses) {
         let time_s = frame as f64 * model.step_s;
-        poses.push(made_flat.pose(&tree.skeleton, &model.tree, places, frame, time_s));
+        poses.push(standing.pose(&model.tree, places, frame, time_s));
     }
-    Ok(tree.document(&made_flat.sway(&model.tree), poses)?)
+    Ok(tree.document(&standing.sway(&model.tree), poses)?)
 }
 
 /// The flat tree in a drawing.
@@ -94,11 +93,20 @@ pub fn read_drawing(path: &Path) -> Result<FlatTree, CommandError> {
 /// # Errors
 /// It encloses nothing, or has too many branches.
 pub fn stood_up(path: &Path, flat: &FlatTree, config: Config) -> Result<DrawnTree, CommandError> {
-    let region = outline::covered(&flat.cover_px(), flat.skeleton.image_size)
+    let region = region(path, &flat.cover_px(), flat.skeleton.image_size)?;
+    Ok(DrawnTree::new(short_name(path), flat, &region, config)?)
+}
+
+/// What a tree of a file fills in its picture.
+fn region(path: &Path, cover_px: &[Vec<Point2<f64>>], size: Size) -> Result<Outline, CommandError> {
+    outline::covered(cover_px, size)
         .with_context(|| path.display().to_string())
-        .map_err(CommandError::Failed)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    Ok(DrawnTree::new(name.into_owned(), flat, &region, config)?)
+        .map_err(CommandError::Failed)
+}
+
+fn short_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or_default();
+    name.to_string_lossy().into_owned()
 }
 
 /// The bytes of a drawing or a model.

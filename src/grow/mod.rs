@@ -33,7 +33,7 @@ pub use engine::{Growth, GrowthRegion, ROUNDS, grow_subtrees};
 pub use features::{Bifurcation, bifurcations};
 pub use flat_tree::{GrowError, grow_flat};
 pub use forest::{Planting, PlantingError};
-pub use fork_statistics::{FEWEST_FORKS, ForkStatistics};
+pub use fork_statistics::ForkStatistics;
 pub use fork_tree::fork_tree;
 pub use library::{Library, Subtree, SubtreeBranch, SubtreeKind};
 pub use motion::{LOOP_S, MotionStatistics, sample_sway};

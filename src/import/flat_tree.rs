@@ -30,43 +30,44 @@ impl FlatTree {
         pieces.any(|ends| distance_to_segment(at_px, ends[0], ends[1]) < ON_TRUNK_PX)
     }
 
-    /// Number of its forks, the foot not counted.
-    pub fn forks(&self) -> usize {
-        let children = self.skeleton.children();
-        children.iter().skip(1).filter(|c| c.len() > 1).count()
-    }
-
-    /// Polygons in the picture, px, that cover the tree together: the outline of the crown, or else
-    /// the convex hull of all above the first fork, and the trunk up to there.
+    /// Polygons in the picture, px, that cover the tree together, as [`cover_px`] has them, or with the
+    /// outline of the crown where it is known.
     pub fn cover_px(&self) -> Vec<Vec<Point2<f64>>> {
-        let nodes = &self.skeleton.nodes;
-        let place = |n: &Node| self.skeleton.image_from_model(&n.position);
-        let heights = nodes.iter().map(|n| n.position.y);
-        let height_px = heights.fold(0.0, f64::max);
-        let margin_px = (MARGIN * height_px).max(2.0);
-        let mut cover = Vec::new();
-        let mut crown: Vec<Point2<f64>> = Vec::new();
-        for (i, node) in nodes.iter().enumerate() {
-            let Some(parent) = node.parent.map(|p| &nodes[p.index()]) else {
-                continue;
-            };
-            if node.level <= 1 {
-                let wide_px = margin_px.max(2.0 * node.radius);
-                let ends = [place(parent), place(node)];
-                cover.push(around(&ends, wide_px, self.skeleton.image_size));
-            }
-            let is_top = node.level == 1 && self.skeleton.mover(NodeId(i as u32)).index() == i;
-            if node.level > 1 || is_top {
-                crown.push(place(node));
-            }
-        }
-        if self.crown_px.is_empty() {
-            cover.push(around(&crown, margin_px, self.skeleton.image_size));
-        } else {
+        let mut cover = cover_px(&self.skeleton);
+        if !self.crown_px.is_empty() {
+            cover.pop();
             cover.push(self.crown_px.clone());
         }
         cover
     }
+}
+
+/// Polygons in the picture of a tree, px, that cover it together: the trunk up to the first fork, and,
+/// as the last, the convex hull of all above it.
+pub fn cover_px(tree: &Skeleton) -> Vec<Vec<Point2<f64>>> {
+    let nodes = &tree.nodes;
+    let place = |n: &Node| tree.image_from_model(&n.position);
+    let heights = nodes.iter().map(|n| n.position.y);
+    let height_px = heights.fold(0.0, f64::max);
+    let margin_px = (MARGIN * height_px).max(2.0);
+    let mut cover = Vec::new();
+    let mut crown: Vec<Point2<f64>> = Vec::new();
+    for (i, node) in nodes.iter().enumerate() {
+        let Some(parent) = node.parent.map(|p| &nodes[p.index()]) else {
+            continue;
+        };
+        if node.level <= 1 {
+            let wide_px = margin_px.max(2.0 * node.radius);
+            let ends = [place(parent), place(node)];
+            cover.push(around(&ends, wide_px, tree.image_size));
+        }
+        let is_top = node.level == 1 && tree.mover(NodeId(i as u32)).index() == i;
+        if node.level > 1 || is_top {
+            crown.push(place(node));
+        }
+    }
+    cover.push(around(&crown, margin_px, tree.image_size));
+    cover
 }
 
 /// The convex hull of places, wider by `margin_px` to all sides, within the picture.

@@ -9,13 +9,12 @@
 //! [`read_cloud`] reads the points of a scan.
 //!
 //! A modelled tree ([`read_model`]) is the skeleton of a glTF file with its motion, or the lines of
-//! an OBJ, PLY, treefile or table of cylinders. It is made flat ([`FlatModel`]).
+//! an OBJ, PLY, treefile or table of cylinders. Its forks and tips are the example ([`StandingModel`]).
 
 mod cloud;
 mod cylinders;
 mod error;
 mod flat_tree;
-mod flatten;
 mod gltf_file;
 mod gltf_motion;
 mod gltf_skeleton;
@@ -29,6 +28,7 @@ mod ply_rows;
 mod segments;
 mod sketch;
 mod sketch_json;
+mod standing;
 mod svg;
 mod svg_path;
 mod svg_place;
@@ -37,12 +37,12 @@ mod treefile;
 
 pub use cloud::{CloudFormat, CloudRead, Units, read_cloud};
 pub use error::ImportError;
-pub use flat_tree::FlatTree;
-pub use flatten::FlatModel;
+pub use flat_tree::{FlatTree, cover_px};
 pub use gltf_skeleton::MovingModel;
 pub use join::joined;
 pub use lens_profile::read_lens_profile;
 pub use model_file::read_model;
 pub use model_tree::{ModelNode, ModelTree, Wood};
 pub use sketch::{Sketch, Stroke, read_sketch, read_strokes};
+pub use standing::StandingModel;
 pub use traced::traced;

@@ -16,11 +16,7 @@ pub fn stand_drawn(
 ) -> Skeleton {
     let mut skeleton = reshape(flat, region, config);
     if !has_radii {
-        let silhouette = Silhouette::Filmed(config.shape.envelope);
-        let room = shape::room(&skeleton, Some(region), silhouette);
-        let trunk_px = trunk_radius_px(&skeleton, config);
-        let seed = config.wood.seed.into();
-        shape::thicken(&mut skeleton, trunk_px, &room, &config.wood, seed);
+        thickened(&mut skeleton, region, config);
         return skeleton;
     }
     for i in 0..skeleton.nodes.len() {
@@ -30,6 +26,15 @@ pub fn stand_drawn(
         }
     }
     skeleton
+}
+
+/// Gives a tree within `region` the radii of the pipe model.
+pub fn thickened(skeleton: &mut Skeleton, region: &Outline, config: &Config) {
+    let silhouette = Silhouette::Filmed(config.shape.envelope);
+    let room = shape::room(skeleton, Some(region), silhouette);
+    let trunk_px = trunk_radius_px(skeleton, config);
+    let seed = config.wood.seed.into();
+    shape::thicken(skeleton, trunk_px, &room, &config.wood, seed);
 }
 
 /// The radius of the trunk that carries all tips of the tree, px: as thick in section as all last

@@ -4,11 +4,22 @@ use super::{Draft, PrepareError, write_document};
 use crate::config::{Config, Leader};
 use crate::document::Document;
 use crate::document::note::{CaptureNote, ModelNote, OutlineNote, Source};
-use crate::import::FlatTree;
+use crate::import::{FlatTree, StandingModel};
 use crate::model::{Outline, Pose, Skeleton, Swaying};
-use crate::pipeline::{MOST_RESHAPED, stand_drawn};
+use crate::pipeline::{MOST_RESHAPED, stand_drawn, thickened};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+
+/// The settings that a modelled tree has if no others are given: all of its branches are there, and trees
+/// like it have no copies; where radii are known the twigs are there, too.
+pub fn modelled_defaults(standing: &StandingModel) -> Config {
+    let mut config = Config::default();
+    config.shape.planes = 1;
+    if standing.has_radii {
+        config.wood.max_twigs = 0;
+    }
+    config
+}
 
 /// A tree that was not filmed, stood up in space.
 #[derive(Clone, Debug)]
@@ -40,6 +51,22 @@ impl DrawnTree {
         let skeleton = stand_drawn(&flat.skeleton, flat.has_radii, region, &config);
         let note = note(name, &skeleton, region, config);
         Ok(Self { note, skeleton })
+    }
+
+    /// A modelled tree as it stands, within `region` in its picture.
+    pub fn modelled(
+        name: String,
+        standing: &StandingModel,
+        region: &Outline,
+        mut config: Config,
+    ) -> Self {
+        config.export.metres_per_px = standing.metres_per_px;
+        let mut skeleton = standing.skeleton.clone();
+        if !standing.has_radii {
+            thickened(&mut skeleton, region, &config);
+        }
+        let note = note(name, &skeleton, region, config);
+        Self { note, skeleton }
     }
 
     /// Writes it as a document to `dir`, which appears when it is complete, or not at all: also where `stop`

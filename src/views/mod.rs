@@ -24,7 +24,7 @@ mod sway_on_scan;
 mod tables;
 mod write;
 
-pub use drawn::DrawnTree;
+pub use drawn::{DrawnTree, modelled_defaults};
 pub use error::PrepareError;
 pub use film_fit::FilmFit;
 pub use forest::PreparedForest;

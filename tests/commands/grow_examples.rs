@@ -5,7 +5,7 @@ use crate::small_disk::SmallDisk;
 use crate::support::{names_in, replayed};
 use crate::to_folder::{FAILED, NO_INPUT, command, done};
 use arborcam::document::Document;
-use arborcam::import::{FlatModel, read_model};
+use arborcam::import::{StandingModel, read_model};
 use arborcam::model::{NodeId, Skeleton, Sway};
 use std::fmt::Write;
 use std::fs;
@@ -171,12 +171,12 @@ fn radii_of_a_treefile_are_those_of_its_tree() {
     let tree = Document::read(&models().join("tree"), 0.0)
         .expect("tree")
         .skeleton;
-    let flat = |name: &str| {
+    let standing = |name: &str| {
         let path = models().join(name);
         let model = read_model(&fs::read(&path).expect("file"), &path).expect("a model");
-        FlatModel::of(&model.tree, 3).expect("made flat").flat
+        StandingModel::of(&model.tree).expect("forks")
     };
-    let (thick, thin) = (flat("thick.txt"), flat("segments.txt"));
+    let (thick, thin) = (standing("thick.txt"), standing("segments.txt"));
     assert!(thick.has_radii && !thin.has_radii);
     assert_eq!(thick.skeleton.nodes.len(), thin.skeleton.nodes.len());
     let heights = |s: &Skeleton| s.nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
@@ -225,9 +225,10 @@ fn sway_and_radii_go_through_tables() {
         assert_eq!(own, measured, "{name}");
         assert!(nodes.iter().all(|n| n.wood.radius > 0.0), "{name}");
         radii.push(nodes.iter().map(|n| n.wood.radius).collect());
-        let flat = FlatModel::of(&model.tree, 1).expect("made flat");
-        assert_eq!(flat.flat.skeleton.nodes.len(), flat.sway(&model.tree).len());
-        assert!(flat.sway(&model.tree).iter().any(Result::is_ok), "{name}");
+        let standing = StandingModel::of(&model.tree).expect("forks");
+        let sway = standing.sway(&model.tree);
+        assert_eq!(standing.skeleton.nodes.len(), sway.len());
+        assert!(sway.iter().any(Result::is_ok), "{name}");
         let out = dir.path().join(format);
         let tree = grown(&path, &out, &["--motion", "wind"]);
         let mut known = tree.sway.iter().flatten().map(rounded).peekable();
@@ -279,13 +280,9 @@ fn what_export_writes_can_be_read_again() {
     for name in ["tree/tree.glb", "tree.gltf"] {
         let path = models().join(name);
         let model = read_model(&fs::read(&path).expect("file"), &path).expect("a model");
-        let flat = FlatModel::of(&model.tree, 1).expect("made flat").flat;
+        let forks = StandingModel::of(&model.tree).expect("forks").skeleton;
         // All forks and all tips are there, copies among them; bends are left out.
-        assert_eq!(
-            forks_and_tips(&flat.skeleton),
-            forks_and_tips(&tree),
-            "{name}"
-        );
+        assert_eq!(forks_and_tips(&forks), forks_and_tips(&tree), "{name}");
         assert!(model.poses.is_empty());
     }
     for (name, file) in [
@@ -322,8 +319,6 @@ fn a_drawing_needs_no_folder_of_its_own() {
     assert!(folder == file, "they differ");
 }
 
-/// Every limb of a model comes to stand in the picture's plane: heights, and distances from where it
-/// leaves the trunk, stay.
 #[test]
 fn a_conifer_is_said_to_lose_its_axis() {
     let dir = tempfile::tempdir().expect("tempdir");
@@ -336,34 +331,82 @@ fn a_conifer_is_said_to_lose_its_axis() {
     assert!(!done(&tree, &dir.path().join("tree")).contains(warning));
 }
 
+/// Forks and tips keep their places in space; bends are left out.
 #[test]
-fn a_modelled_tree_is_made_flat_limb_by_limb() {
+fn a_modelled_tree_is_taken_as_it_stands() {
     let obj = "v 0 0 0\nv 0 10 0\nv 0 20 0\nv 3 14 4\nv 6 16 8\nv 3 18 4\nv -4 13 3\nv 1 25 0\n\
-               v -1 24 0\nl 1 2 3 8\nl 3 9\nl 2 4 5\nl 4 6\nl 2 7\n";
+               v -1 24 0\nv 0 4 1\nl 1 10 2 3 8\nl 3 9\nl 2 4 5\nl 4 6\nl 2 7\n";
     let model = read_model(obj.as_bytes(), Path::new("a.obj")).expect("a model");
-    let flat = FlatModel::of(&model.tree, 1)
-        .expect("made flat")
-        .flat
-        .skeleton;
-    let scale = flat.nodes.iter().map(|n| n.position.y).fold(0.0, f64::max) / 25.0;
+    let standing = StandingModel::of(&model.tree).expect("forks").skeleton;
+    let nodes = &standing.nodes;
+    let scale = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max) / 25.0;
     let mut places: Vec<[i64; 3]> = Vec::new();
-    for node in &flat.nodes {
+    for node in nodes {
+        assert_eq!(node.copy_of, None);
         let at = node.position.coords / scale;
         places.push([at.x, at.y, at.z].map(|x| (1e3 * x).round() as i64));
     }
     places.sort_unstable();
     let expected = [
-        [-5000, 13000, 0],
+        [-4000, 13000, 3000],
         [-1000, 24000, 0],
         [0, 0, 0],
         [0, 10000, 0],
         [0, 20000, 0],
         [1000, 25000, 0],
-        [5000, 14000, 0],
-        [5000, 18000, 0],
-        [10000, 16000, 0],
+        [3000, 14000, 4000],
+        [3000, 18000, 4000],
+        [6000, 16000, 8000],
     ];
     assert_eq!(places, expected);
+}
+
+/// Trees of a file that `export` wrote are as large as those of the capture that it was written from, and
+/// none of their branches is a copy. Tables hold the twigs, and no more are added.
+#[test]
+fn trees_of_an_exported_file_are_those_of_its_capture() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [model, table, settings] =
+        ["tree.gltf", "tree.csv", "one-plane.toml"].map(|name| dir.path().join(name));
+    fs::write(&settings, "[shape]\nplanes = 1\n").expect("write");
+    for (format, file) in [("gltf", &model), ("qsm", &table)] {
+        let flat = ["--format", format, "--planes", "1"];
+        done(&[&["export", text(replayed())], &flat[..]].concat(), file);
+    }
+    let still = ["--motion", "none"];
+    let of = |example: &Path, name: &str| grown(example, &dir.path().join(name), &still);
+    let by_model = of(&model, "model");
+    let by_table = of(&table, "table");
+    let by_film = grown(
+        replayed(),
+        &dir.path().join("film"),
+        &["--motion", "none", "--config", text(&settings)],
+    );
+    let [tips, of_model, of_table] =
+        [&by_film, &by_model, &by_table].map(|tree| forks_and_tips(&tree.skeleton)[1]);
+    let ratio = of_model as f64 / tips as f64;
+    assert!(
+        (0.8..1.25).contains(&ratio),
+        "{of_model} tips, {tips} of the film"
+    );
+    assert!(of_table > tips, "{of_table} tips, {tips} of the film");
+    assert_eq!(by_table.note.config.wood.max_twigs, 0);
+    assert!(by_model.note.config.wood.max_twigs > 0);
+    // The trunk goes up to the main fork of the same tree.
+    let [film, model, table] = [&by_film, &by_model, &by_table].map(|tree| {
+        let nodes = &tree.skeleton.nodes;
+        assert!(nodes.iter().all(|n| n.copy_of.is_none()));
+        let height = nodes.iter().map(|n| n.position.y).fold(0.0, f64::max);
+        nodes[1].position.y / height
+    });
+    assert!(
+        (model - film).abs() < 0.1,
+        "{model} of the height, {film} of the film"
+    );
+    assert!(
+        (table - film).abs() < 0.1,
+        "{table} of the height, {film} of the film"
+    );
 }
 
 /// The joints of a capture's model move, and so do the trees that are grown of it: as fast as those

@@ -5,7 +5,7 @@ use crate::chance::Chance;
 use crate::ros;
 use arborcam::cloud::{CloudOptions, tree_of_cloud};
 use arborcam::config::Config;
-use arborcam::import::{CloudFormat, FlatModel, joined, read_cloud, read_model, read_sketch};
+use arborcam::import::{CloudFormat, StandingModel, joined, read_cloud, read_model, read_sketch};
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
 use arborcam::source::{self, CameraFile, kinect_rig};
@@ -169,7 +169,7 @@ fn no_drawing_and_no_model_brings_the_readers_down() {
         for name in ["seed.glb", "seed.obj", "seed.ply", "seed.csv", "seed.txt"] {
             each(&seed, |bytes| {
                 let tree = read_model(bytes, Path::new(name))
-                    .and_then(|model| FlatModel::of(&model.tree, 3).map(|_| model));
+                    .and_then(|model| StandingModel::of(&model.tree).map(|_| model));
                 trees += usize::from(tree.is_ok());
                 assert!(tree.err().is_none_or(|e| !e.to_string().contains('\n')));
             });
