@@ -28,13 +28,16 @@ film_live() {
 }
 had_time_for_every_frame() { grep -q '"frames_dropped_tracker": 0' "/vm/live-$format/capture/capture.json"; }
 
+fastest_hz=8
 for format in mjpeg yuyv; do
     # Only a capture that had time for every frame can equal its replay; a machine that is busy otherwise gets a slower
-    # film.
+    # film, and so does the next format there.
     for rate_hz in 8 4 2; do
+        ((rate_hz <= fastest_hz)) || continue
         film_live $rate_hz
         ! had_time_for_every_frame || break
     done
+    fastest_hz=$rate_hz
     cp "$work/live-$format.mcap" /vm/
     begin "replay-$format" replay "$work/live-$format.mcap" --headless --fast --config "$work/camera.toml" \
         --outline "$work/outline.json" --out "$work/replay-$format"
