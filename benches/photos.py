@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """How well `arborcam photo` makes trees of photographs whose truth is known.
 
-  photos.py ARBORCAM WORK_DIR SEED... [--without-strokes] [--json FILE]
+  photos.py ARBORCAM WORK_DIR SEED... [--without-strokes | --careless] [--json FILE]
 
 Each seed is a made photograph (made_photos.py, 1500 px wide): odd seeds are bare, even ones in leaf. It gets a crown stroke and
-a branch stroke along the trunk, or none. One row a photograph:
+a branch stroke along the trunk, or none; a careless one goes up a third of the way, beside the middle by half of the radius.
+One row a photograph:
 
   foliage     leaves.png of the document against the leaves that are seen, shared pixels by all of either; in leaf only
   on_wood     share of the traced edges' length with a true branch within 4 px that runs within 30 degrees of it
@@ -37,6 +38,7 @@ def main():
     parser.add_argument("work_dir", type=Path)
     parser.add_argument("seeds", type=int, nargs="+")
     parser.add_argument("--without-strokes", action="store_true")
+    parser.add_argument("--careless", action="store_true")
     parser.add_argument("--json", type=Path)
     args, more = parser.parse_known_args()
     rows = {}
@@ -64,7 +66,8 @@ def row(args, seed, more):
         subprocess.run([sys.executable, HERE / "made_photos.py", args.work_dir, folder.name, str(seed), look], check=True)
     out = args.work_dir / f"tree-{seed}"
     subprocess.run(["rm", "-rf", out], check=True)
-    strokes = [] if args.without_strokes else ["--crown", folder / "crown.json", "--branch", folder / "trunk.json"]
+    trunk = careless(folder) if args.careless else folder / "trunk.json"
+    strokes = [] if args.without_strokes else ["--crown", folder / "crown.json", "--branch", trunk]
     begin = time.monotonic()
     run = subprocess.Popen([args.arborcam, "photo", folder / "photo.jpg", *strokes, *more, "--out", out],
                            stderr=subprocess.PIPE, text=True)
@@ -83,6 +86,18 @@ def row(args, seed, more):
     figures |= side(film, capture)
     figures["nodes"] = len(capture.rows)
     return figures
+
+
+def careless(folder):
+    """The trunk's stroke as a hurried hand draws it."""
+    drawn = json.loads((folder / "trunk.json").read_text())
+    trunk = json.loads((folder / "truth.json").read_text())["branches"][0]
+    beside = 0.5 * trunk["rest_radius_px"][0]
+    line = drawn["polyline_px"][:max(len(drawn["polyline_px"]) // 3, 2)]
+    drawn["polyline_px"] = [[u - beside, v] for u, v in line]
+    path = folder / "careless.json"
+    path.write_text(json.dumps(drawn))
+    return path
 
 
 def peak_mb(arborcam, folder, strokes, more, out):

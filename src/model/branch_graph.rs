@@ -85,16 +85,20 @@ impl BranchGraph {
         length_px
     }
 
-    /// The way along the wood from the foot to the end that is farthest from it, px; empty without wood.
-    pub fn longest_way_px(&self) -> Vec<Point2<f64>> {
+    /// The way along the wood from the foot by the node `by` to the end that is farthest from it, px; empty
+    /// without wood. The foot is node 0.
+    pub fn longest_way_px(&self, by: usize) -> Vec<Point2<f64>> {
         let mut from_foot_px = vec![0.0; self.nodes.len()];
+        let mut leads_by = vec![false; self.nodes.len()];
         let mut end: Option<usize> = None;
         for (i, node) in self.nodes.iter().enumerate() {
+            leads_by[i] = i == by;
             if let Some(parent) = node.parent {
                 let way = node.position_px - self.nodes[parent].position_px;
                 from_foot_px[i] = from_foot_px[parent] + way.norm();
+                leads_by[i] |= leads_by[parent];
             }
-            if end.is_none_or(|end| from_foot_px[i] > from_foot_px[end]) {
+            if leads_by[i] && end.is_none_or(|end| from_foot_px[i] > from_foot_px[end]) {
                 end = Some(i);
             }
         }
@@ -211,8 +215,12 @@ mod tests {
         let mut graph = fork();
         graph.nodes.push(WoodNode::made_up(Some(3), 150.0, 60.0));
         let way = [[100.0, 200.0], [100.0, 100.0], [140.0, 70.0], [150.0, 60.0]];
-        assert_eq!(graph.longest_way_px(), way.map(Point2::from));
-        assert_eq!(BranchGraph::default().longest_way_px(), []);
+        assert_eq!(graph.longest_way_px(0), way.map(Point2::from));
+        assert_eq!(BranchGraph::default().longest_way_px(0), []);
+        // By the other branch of the fork, which ends there.
+        let by_other = graph.longest_way_px(2);
+        assert_eq!(by_other.last(), Some(&graph.nodes[2].position_px));
+        assert_eq!(by_other[..2], graph.longest_way_px(0)[..2]);
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
+use crate::signal::distance_to_segment;
 use crate::wood::{self, LeafColour, LeafHint, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
@@ -166,7 +167,7 @@ pub fn see_tree(
         false => Some(crown(&drawn.crown_px, picture.size)?),
     };
     match crown {
-        Some(crown) if !strokes.is_empty() => looked.see(Attempt { crown, strokes }),
+        Some(crown) if !strokes.is_empty() => looked.along_drawn(Attempt { crown, strokes }),
         crown => looked.best(&Half { crown, strokes }),
     }
 }
@@ -210,6 +211,31 @@ impl Looked<'_> {
             has_colour: self.has_colour,
             is_said_bare: self.options.leaves == LeafHint::Bare,
         })
+    }
+
+    /// The tree along drawn strokes. The trunk settles from its stroke; it is as it was drawn where that leads
+    /// away from the stroke.
+    fn along_drawn(&self, drawn: Attempt) -> Result<TreeInPhoto, PhotoError> {
+        let settling = Settling::of(self.picture, self.options, self.cancel).map_err(failed)?;
+        let look = match settling.look_at_drawn(&drawn) {
+            Ok(look) => look,
+            Err(NotSeen::Cancelled) => return Err(PhotoError::Cancelled),
+            // In the whole picture it is found, or why it is not.
+            Err(_) => return self.see(drawn),
+        };
+        let trunk = match settling.trunk(look) {
+            Ok(trunk) if leads_along(&trunk, &drawn.strokes[0], self.picture.size) => trunk,
+            Err(NotSeen::Cancelled) => return Err(PhotoError::Cancelled),
+            Ok(_) | Err(_) => return self.see(drawn),
+        };
+        let strokes = drawn.strokes.clone();
+        let mut settled = drawn.clone();
+        settled.strokes[0] = trunk;
+        match self.see(settled) {
+            Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
+            Err(_) => self.see(drawn),
+            Ok(tree) => Ok(TreeInPhoto { strokes, ..tree }),
+        }
     }
 
     /// Of all attempts to find what was not drawn the one that is most likely right.
@@ -296,6 +322,16 @@ impl Looked<'_> {
             tree => tree,
         }
     }
+}
+
+/// Whether a trunk leads along a line that was drawn for it: no corner of that is farther from it than branches
+/// are looked for beside a stroke.
+fn leads_along(trunk: &Stroke, drawn: &Stroke, size: Size) -> bool {
+    let beside_px = wood::BESIDE_STROKE * f64::from(size.width);
+    drawn.iter().all(|at| {
+        let mut pieces = trunk.windows(2);
+        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= beside_px)
+    })
 }
 
 /// An attempt that was looked at for the first time.

@@ -1,7 +1,7 @@
-//! The trunk of a bare tree that was found without a stroke, made sure of in a smaller picture.
+//! The trunk of a tree that is drawn, or found and bare, made sure of in a smaller picture.
 //!
-//! The line that a trunk is found by may lie on the dark side of its bark, and ends below the crown: by its
-//! colours alone wood is found with holes, and too thin. Colours are learned anew along the middle of what was
+//! The line that a trunk is found by may lie on the dark side of its bark, and ends below the crown; one that
+//! is drawn runs beside its middle, and ends where the hand stopped. By its colours alone wood is found with holes, and too thin. Colours are learned anew along the middle of what was
 //! taken for wood until that stays (in turns, as Rother et al. 2004 sect. 3). Where the trunk and its limbs run
 //! is seen in a small picture as well, in a quarter of the time.
 
@@ -11,12 +11,15 @@ use crate::cancel::CancelToken;
 use crate::model::Rgb;
 use crate::outline::Reduced;
 use crate::signal::distance_to_segment;
-use crate::wood::{self, NotSeen, SeenInPhotograph, Stroke};
+use crate::wood::{self, LeavesSeen, NotSeen, SeenInPhotograph, Stroke};
+use nalgebra::Point2;
 
 /// Width to which photographs are reduced for this, px.
 const WIDTH: u32 = 750;
 /// How often a tree is looked at again at most.
 const ROUNDS: usize = 5;
+/// A drawn stroke along the middle of its trunk is as good as what would settle, if it is this share of it long.
+const LONG: f64 = 0.5;
 /// Colours are not learned anew along a line that stays within this of the one before, px: it is drawn so wide.
 const STAYS_PX: f64 = 2.0;
 
@@ -42,6 +45,19 @@ impl<'a> Settling<'a> {
         })
     }
 
+    /// What is seen of a tree along drawn strokes.
+    ///
+    /// # Errors
+    /// Nothing is seen.
+    pub fn look_at_drawn(&self, drawn: &Attempt) -> Result<SmallLook, NotSeen> {
+        let attempt = self.small(drawn)?.ok_or(NotSeen::Crown)?;
+        let leaves = LeavesSeen::of(self.photo(&attempt), self.cancel)?;
+        let mut look = self.beside(leaves, attempt)?;
+        let trunk = look.attempt.strokes.first();
+        look.drawn_to = trunk.and_then(|trunk| trunk.last()).copied();
+        Ok(look)
+    }
+
     /// What is seen of a bare tree along the strokes of an attempt; `None` of one in leaf.
     ///
     /// # Errors
@@ -50,8 +66,22 @@ impl<'a> Settling<'a> {
         let Some(attempt) = self.small(attempt)? else {
             return Ok(None);
         };
-        let seen = wood::in_photograph_of_bare(self.photo(&attempt), self.cancel)?;
-        Ok(seen.map(|seen| SmallLook { attempt, seen }))
+        let leaves = LeavesSeen::of(self.photo(&attempt), self.cancel)?;
+        match leaves.in_leaf() {
+            true => Ok(None),
+            false => self.beside(leaves, attempt).map(Some),
+        }
+    }
+
+    /// The look at the wood beside leaves.
+    fn beside(&self, leaves: LeavesSeen, attempt: Attempt) -> Result<SmallLook, NotSeen> {
+        let seen = wood::beside_leaves(self.photo(&attempt), &leaves, self.cancel)?;
+        Ok(SmallLook {
+            attempt,
+            leaves,
+            seen,
+            drawn_to: None,
+        })
     }
 
     /// The line at which the trunk settles, px of the whole picture, after a first look.
@@ -61,25 +91,40 @@ impl<'a> Settling<'a> {
     pub fn trunk(&self, first: SmallLook) -> Result<Stroke, NotSeen> {
         let SmallLook {
             attempt: mut small,
+            leaves,
             mut seen,
+            drawn_to,
         } = first;
+        let size = self.reduced.picture.size;
         for _ in 0..ROUNDS {
-            let way_px = seen.wood.branches.longest_way_px();
+            let branches = &seen.wood.branches;
+            let by = drawn_to.and_then(|end| branches.piece_at(end, size));
+            let way_px = branches.longest_way_px(by.unwrap_or(0));
+            let is_drawn_well = by.is_some()
+                && small.strokes.first().is_some_and(|drawn| {
+                    lies_on(drawn, &way_px) && length_px(drawn) >= LONG * length_px(&way_px)
+                });
+            if is_drawn_well {
+                break;
+            }
             let stays = small
                 .strokes
                 .first()
                 .is_none_or(|line| lies_on(&way_px, line));
-            small.strokes = vec![way_px];
+            match small.strokes.first_mut() {
+                Some(trunk) => *trunk = way_px,
+                None => small.strokes.push(way_px),
+            }
             if stays {
                 break;
             }
-            seen = match wood::in_photograph(self.photo(&small), self.cancel) {
+            seen = match wood::beside_leaves(self.photo(&small), &leaves, self.cancel) {
                 Ok(next) => next,
                 Err(NotSeen::Cancelled) => return Err(NotSeen::Cancelled),
                 Err(_) => break,
             };
         }
-        let way_px = small.strokes.iter().flatten();
+        let way_px = small.strokes.first().into_iter().flatten();
         Ok(way_px.map(|at| self.reduced.to_whole(*at)).collect())
     }
 
@@ -113,7 +158,10 @@ impl<'a> Settling<'a> {
 pub struct SmallLook {
     /// In px of that picture.
     attempt: Attempt,
+    leaves: LeavesSeen,
     pub seen: SeenInPhotograph,
+    /// Where the trunk's stroke ends if it was drawn: the trunk leads there.
+    drawn_to: Option<Point2<f64>>,
 }
 
 /// Whether all corners of a line are on another one.
@@ -122,6 +170,10 @@ fn lies_on(line: &Stroke, other: &Stroke) -> bool {
         let mut pieces = other.windows(2);
         pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= STAYS_PX)
     })
+}
+
+fn length_px(line: &Stroke) -> f64 {
+    line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
 #[cfg(test)]

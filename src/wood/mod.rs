@@ -39,7 +39,9 @@ mod ways;
 
 pub use foliage::{LeafColour, LeafHint};
 pub use greenery::greenery;
-pub use photograph::{NotSeen, Photograph, SeenInPhotograph, in_photograph, in_photograph_of_bare};
+pub use photograph::{
+    BESIDE_STROKE, LeavesSeen, NotSeen, Photograph, SeenInPhotograph, beside_leaves, in_photograph,
+};
 
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;

@@ -30,7 +30,7 @@ use std::sync::Arc;
 const FREEDOM_PX: f64 = 10.0;
 /// Branches are looked for so far beside a branch stroke beyond the crown, as a share of the
 /// picture's width (the radius of the circles of Tan et al. 2008 sect. 2.2, 50 px of 1500).
-const BESIDE_STROKE: f64 = 1.0 / 30.0;
+pub const BESIDE_STROKE: f64 = 1.0 / 30.0;
 /// Parts of the mixtures of wood and of all else (Tan et al. 2008 sect. 2.2).
 pub const PARTS: usize = 5;
 /// What is added to the odds of a bare tree's pixel on a ridge, and elsewhere; to those of a tree
@@ -124,17 +124,18 @@ pub enum NotSeen {
 }
 
 /// The leaves of a crown, and what they were found by.
-struct LeavesSeen {
+pub struct LeavesSeen {
     /// The crown stroke with the freedom that it is given.
     within: Vec<u8>,
-    is_stroke: Vec<bool>,
     /// 255 or 0, row by row.
     leaves: Vec<u8>,
     is_as_around: bool,
 }
 
 impl LeavesSeen {
-    fn of(photo: Photograph, cancel: &CancelToken) -> Result<Self, NotSeen> {
+    /// # Errors
+    /// `cancel` ends the work, or OpenCV fails.
+    pub fn of(photo: Photograph, cancel: &CancelToken) -> Result<Self, NotSeen> {
         let size = photo.picture.size;
         let within = widened(&photo.crown.mask, size, FREEDOM_PX)?;
         let is_stroke = drawing::on_lines(photo.strokes, size, drawing::STROKE_PX)?;
@@ -159,13 +160,13 @@ impl LeavesSeen {
         crown::without_far_pieces(&mut leaves, size)?;
         Ok(Self {
             within,
-            is_stroke,
             leaves,
             is_as_around,
         })
     }
 
-    fn in_leaf(&self) -> bool {
+    /// Whether there are any.
+    pub fn in_leaf(&self) -> bool {
         self.leaves.iter().any(|leaf| *leaf != 0)
     }
 }
@@ -176,28 +177,16 @@ impl LeavesSeen {
 /// The strokes are not on a tree, `cancel` ends the work, or OpenCV fails.
 pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPhotograph, NotSeen> {
     let leaves = LeavesSeen::of(photo, cancel)?;
-    with_wood(photo, leaves, cancel)
+    beside_leaves(photo, &leaves, cancel)
 }
 
-/// The same of a bare tree; `None`, without a look at its wood, of one in leaf.
+/// The wood beside leaves that were found before, perhaps with other strokes along the branches.
 ///
 /// # Errors
 /// As of [`in_photograph`].
-pub fn in_photograph_of_bare(
+pub fn beside_leaves(
     photo: Photograph,
-    cancel: &CancelToken,
-) -> Result<Option<SeenInPhotograph>, NotSeen> {
-    let leaves = LeavesSeen::of(photo, cancel)?;
-    match leaves.in_leaf() {
-        true => Ok(None),
-        false => with_wood(photo, leaves, cancel).map(Some),
-    }
-}
-
-/// The wood beside the leaves.
-fn with_wood(
-    photo: Photograph,
-    seen: LeavesSeen,
+    seen: &LeavesSeen,
     cancel: &CancelToken,
 ) -> Result<SeenInPhotograph, NotSeen> {
     let size = photo.picture.size;
@@ -208,12 +197,13 @@ fn with_wood(
     }
     let LeavesSeen {
         within,
-        is_stroke,
         leaves,
         is_as_around,
     } = seen;
-    let region = with_strokes(photo.crown, &within, photo.strokes)?;
-    let empty = without_wood(size, &leaves);
+    let is_as_around = *is_as_around;
+    let is_stroke = drawing::on_lines(photo.strokes, size, drawing::STROKE_PX)?;
+    let region = with_strokes(photo.crown, within, photo.strokes)?;
+    let empty = without_wood(size, leaves);
     let on_strokes = StrokeColours::of(photo, is_stroke, &region, &empty.is_leaf)?;
     let mask = wood_mask(photo, &region, &on_strokes, empty, cancel)?;
     let traced = match photo.trace_by {
@@ -230,7 +220,7 @@ fn with_wood(
     }
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
     let level_share = branches.level_share();
-    hide_radii(&mut branches, &leaves, size);
+    hide_radii(&mut branches, leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
     for (i, leaf) in leaves.iter().enumerate() {
@@ -240,7 +230,7 @@ fn with_wood(
     let bark = bark::tile(photo.picture, &wood, &branches);
     let leaves = Luma {
         size,
-        pixels: leaves,
+        pixels: leaves.clone(),
     };
     let at_rest = AtRest {
         picture: photo.picture.clone(),
@@ -260,8 +250,8 @@ fn with_wood(
         is_as_around: mask.in_leaf && is_as_around,
         level_share,
         may_have_red_leaves: photo.leaves == LeafHint::Unknown
-            && share_of(photo.picture, &within, LeafColour::Red) > RED_SHARE
-            && share_of(photo.picture, &within, LeafColour::Green) < GREEN_SHARE,
+            && share_of(photo.picture, within, LeafColour::Red) > RED_SHARE
+            && share_of(photo.picture, within, LeafColour::Green) < GREEN_SHARE,
     })
 }
 

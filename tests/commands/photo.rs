@@ -251,6 +251,38 @@ fn strokes_half_a_pixel_beside_give_nearly_the_same_tree() {
     }
 }
 
+/// A short stroke beside the middle of the trunk gives the tree of one along all of it: its radius, and both
+/// limbs.
+#[test]
+fn a_careless_stroke_gives_the_tree_of_a_careful_one() {
+    let scene = Scene::new(photograph(false));
+    let (careful, _) = scene.tree("", "careful");
+    let short = [
+        [FOOT[0] + 4.0, FOOT[1] - 5.0],
+        [FOOT[0] + 4.0, FORK[1] + 50.0],
+    ];
+    scene.write(
+        "trunk.json",
+        &format!(r#"{{"width": 480, "height": 360, "polyline_px": {short:?}}}"#),
+    );
+    let (careless, _) = scene.tree("", "careless");
+    for end in ENDS {
+        let offs = traced_px(&careless)
+            .into_iter()
+            .map(|[_, tip]| (tip - Point2::from(end)).norm());
+        assert!(
+            offs.fold(f64::INFINITY, f64::min) < 12.0,
+            "no limb to {end:?}"
+        );
+    }
+    let [careful, careless] = [&careful, &careless].map(|tree| tree.skeleton.nodes[1].radius);
+    let ratio = careless / careful;
+    assert!(
+        (0.8..1.25).contains(&ratio),
+        "{careless} px, {careful} px of the careful one"
+    );
+}
+
 /// The pieces of branches that were traced, in the picture.
 fn traced_px(tree: &Document) -> Vec<[Point2<f64>; 2]> {
     let mut pieces = Vec::new();
