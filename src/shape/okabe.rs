@@ -109,16 +109,12 @@ impl SideStroke {
 
 /// The strokes of side wood, each after the one that it leaves.
 fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
-    let piece_px = |i: usize| {
-        let node = &tree.nodes[i];
-        let below = node.parent.map_or(node, |p| &tree.nodes[p.index()]);
-        (node.position - below.position).xy().norm()
-    };
     // How far side wood reaches from each node on, and by which child it reaches farthest.
     let mut farthest: Vec<(f64, Option<usize>)> = vec![(0.0, None); tree.nodes.len()];
     for i in (1..tree.nodes.len()).rev().filter(|i| is_side[*i]) {
-        let reach_px = piece_px(i) + farthest[i].0;
-        if let Some(parent) = tree.nodes[i].parent.map(|p| p.index())
+        let reach_px = piece_px(tree, i) + farthest[i].0;
+        // A file may hang a node on a later one.
+        if let Some(parent) = tree.nodes[i].parent.map(|p| p.index()).filter(|p| *p < i)
             && reach_px >= farthest[parent].0
         {
             farthest[parent] = (reach_px, Some(i));
@@ -135,11 +131,18 @@ fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
             nodes.push(next);
         }
         strokes.push(SideStroke {
-            length_px: nodes.iter().map(|node| piece_px(*node)).sum(),
+            length_px: nodes.iter().map(|node| piece_px(tree, *node)).sum(),
             nodes,
         });
     }
     strokes
+}
+
+/// From a node's parent to the node, in the picture.
+fn piece_px(tree: &Skeleton, i: usize) -> f64 {
+    let node = &tree.nodes[i];
+    let below = node.parent.map_or(node, |p| &tree.nodes[p.index()]);
+    (node.position - below.position).xy().norm()
 }
 
 /// Places along a straight way.
@@ -307,6 +310,19 @@ mod tests {
         assert!((depths[6] - depths[4] - 9.0).abs() < 1e-9, "{depths:?}");
         // The twig parts from what it lies along.
         assert!((slope(4, 7) - slope(4, 5)).abs() > 0.1, "{depths:?}");
+    }
+
+    /// A file may say anything.
+    #[test]
+    fn side_wood_in_a_circle_comes_to_an_end() {
+        let mut tree = Skeleton::forked();
+        for (name, parent) in [(20, 5), (21, 4)] {
+            let mut node = Node::made_up(name, Some(parent), [-60.0, 175.0, 0.0]);
+            node.moves_with = Some(NodeId(2));
+            tree.nodes.push(node);
+        }
+        set_side_depths_apart(&mut tree);
+        assert_eq!(tree.nodes.len(), 6);
     }
 
     #[test]
