@@ -32,18 +32,16 @@ impl RawTree {
         middle.collect()
     }
 
-    /// Places between nodes that are farther apart than `longest`, no two of them farther than that: where
-    /// the tree leads over a gap.
-    pub fn between(&self, longest: f64) -> Vec<Point3<f32>> {
+    /// Places between nodes, and below the first one from `foot` on, that are farther apart than `longest`, no
+    /// two of them farther than that: where the tree leads over a gap. Each with the upper of its nodes.
+    pub fn between(&self, foot: Point3<f64>, longest: f64) -> Vec<(u32, Point3<f32>)> {
         let mut places = Vec::new();
-        for node in &self.nodes {
-            let Some(parent) = node.parent else {
-                continue;
-            };
-            let from = self.nodes[parent].at;
+        for (number, node) in (0..).zip(&self.nodes) {
+            let from = node.parent.map_or(foot, |parent| self.nodes[parent].at);
             let pieces = ((node.at - from).norm() / longest).ceil();
             for k in 1..pieces as usize {
-                places.push((from + (node.at - from) * (k as f64 / pieces)).cast());
+                let at = from + (node.at - from) * (k as f64 / pieces);
+                places.push((number, at.cast()));
             }
         }
         places
