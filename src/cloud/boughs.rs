@@ -5,6 +5,7 @@
 
 use super::CloudTree;
 use super::fit::FOOT_SHARE;
+use super::verdict::may_be_of_crown;
 use nalgebra::{Point2, Point3, Vector2};
 
 /// Lines that come together pass each other at less than this share of the distance of their feet.
@@ -68,7 +69,8 @@ impl Stem {
     }
 }
 
-/// Says of each tree how far below its foot it comes together with the one that it does so soonest with.
+/// Says of each tree how far below its foot it comes together with the one that it does so soonest with, and, where
+/// no ground was scanned, whether another one may be part of a crown.
 pub(super) fn look_for_forks(trees: &mut [&mut CloudTree]) {
     let stems: Vec<Option<Stem>> = trees.iter().map(|tree| Stem::of(tree)).collect();
     for (number, tree) in trees.iter_mut().enumerate() {
@@ -76,6 +78,14 @@ pub(super) fn look_for_forks(trees: &mut [&mut CloudTree]) {
         let others = stems.iter().enumerate().filter(|(k, _)| *k != number);
         let forks = others.filter_map(|(_, other)| own.fork_below(other.as_ref()?));
         tree.figures.fork_below = forks.min_by(f64::total_cmp);
+    }
+    let is_of_crown: Vec<bool> = trees
+        .iter()
+        .map(|tree| may_be_of_crown(&tree.figures))
+        .collect();
+    for (number, tree) in trees.iter_mut().enumerate() {
+        let mut others = is_of_crown.iter().enumerate().filter(|(k, _)| *k != number);
+        tree.figures.beside_crown = !tree.figures.has_ground && others.any(|(_, is)| *is);
     }
 }
 

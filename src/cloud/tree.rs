@@ -65,6 +65,8 @@ pub struct CloudFigures {
     /// Of several trees how far below the feet its trunk comes together with that of another, as a share of the
     /// height of the higher; `None` where it does with none.
     pub fork_below: Option<f64>,
+    /// Whether no ground was scanned, and another tree of the cloud may be part of a crown without its trunk.
+    pub beside_crown: bool,
 }
 
 impl CloudFigures {

@@ -28,6 +28,7 @@ pub fn verdict(figures: &CloudFigures) -> Verdict {
         foot(figures),
         cut_off(figures),
         bough(figures),
+        beside_crown(figures),
         off_wood(figures),
     ];
     Verdict::of_findings(found.into_iter().flatten())
@@ -75,6 +76,23 @@ fn bough(figures: &CloudFigures) -> Option<Finding> {
         ),
         advice: "if it is one tree, scan its trunk down to the ground, and leave some ground in the cloud".to_owned(),
     })
+}
+
+/// Whether it may be of the crown that another tree of its cloud seems to be of. A crown falls into boughs and
+/// branches, and not all of them show it.
+fn beside_crown(figures: &CloudFigures) -> Option<Finding> {
+    (figures.beside_crown && !may_be_of_crown(figures)).then(|| Finding {
+        grade: Grade::Fair,
+        reason: "no ground was scanned, and another tree of the cloud may be part of a crown without its trunk: it may be \
+                 another part"
+            .to_owned(),
+        advice: "scan the trunk down to the ground, and leave some ground in the cloud".to_owned(),
+    })
+}
+
+/// Whether it may be a crown without its trunk, or part of one.
+pub(super) fn may_be_of_crown(figures: &CloudFigures) -> bool {
+    cut_off(figures).is_some() || bough(figures).is_some()
 }
 
 fn off_wood(figures: &CloudFigures) -> Option<Finding> {
@@ -136,6 +154,20 @@ mod tests {
         assert!(line.contains("30 % of the height below"), "{line}");
         one.fork_below = Some(0.9);
         assert_eq!(verdict(&one), Verdict::default());
+    }
+
+    #[test]
+    fn what_stands_beside_parts_of_a_crown_is_fair() {
+        let mut one = figures(Some(1.07), 0.97);
+        one.has_ground = false;
+        one.beside_crown = true;
+        let line = verdict(&one).line();
+        assert!(
+            line.starts_with("fair, because: no ground was scanned, and another"),
+            "{line}"
+        );
+        one.clear_stem = Some(0.05);
+        assert_eq!(verdict(&one).reasons.len(), 1);
     }
 
     #[test]
