@@ -19,7 +19,7 @@ pub struct Participation {
     /// Frequency of the mode, Hz.
     #[serde(serialize_with = "super::rounded::to_5")]
     pub frequency_hz: f64,
-    /// The piece of a botanical branch whose own mode it is; `None` for one that the tree lacks.
+    /// The botanical branch whose own mode it is; `None` for one that the tree lacks.
     pub branch: Option<String>,
     /// Share of the squares of the swing of the branch's points over all modes, 0 to 1.
     #[serde(serialize_with = "super::rounded::to_3")]
@@ -42,7 +42,7 @@ pub fn participation(
             out.push(Participation {
                 mode: k + 1,
                 frequency_hz: mode.sway.frequency_hz.value,
-                branch: mode.node.map(|of| branches.piece_name(of)),
+                branch: mode.node.map(|of| branches.name(of)),
                 share,
             });
         }
