@@ -19,7 +19,7 @@ const LEAST_WIDTH: f32 = 0.15;
 /// The lower side of a crown is rough, and a piece of it is small. Ground is smooth, or all stands on it: its
 /// roughness, divided by the share of the cloud's cells that it covers, is no more than this. 0.38
 /// at most for real plots (three scanned from the ground, one from a drone, one from an aeroplane) and made clouds
-/// down to 2 % of their points; 0.64 and more for what is found below crowns that were cut off (20 made trees of
+/// down to 2 % of their points; 0.64 and more for what is found below crowns that were cut off (18 made trees of
 /// seeds 68811 to 68830, a real spruce). Two parts of one of the plots, 10 m of undergrowth each, have 0.74 and 1.1.
 const ROUGHEST: f32 = 0.5;
 /// The roughness is the quantile of this share of how far the lowest points lie off planes through those about
