@@ -7,12 +7,9 @@ use super::error::ImportError;
 use super::flat_tree::flat_node;
 use super::model_tree::ModelTree;
 use super::sketch::refuse_more;
-use crate::model::{Node, NodeId, Pose, Size, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{NOT_FILMED_PX, Node, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
 use nalgebra::{Point2, Point3, UnitQuaternion};
 
-/// Height of the tree in its picture, px, and the room around it.
-const HEIGHT_PX: f64 = 720.0;
-const ROOM_PX: f64 = 40.0;
 /// A tree is not so many times as wide as it is high.
 const WIDEST: f64 = 8.0;
 /// Forks on one way from the foot: levels are counted in a byte.
@@ -42,7 +39,7 @@ impl StandingModel {
         if height <= 0.0 || far.fold(0.0, f64::max) > WIDEST * height {
             return Err(ImportError::NoHeight);
         }
-        let scale = HEIGHT_PX / height;
+        let scale = NOT_FILMED_PX / height;
         let forks = Forks::of(model)?;
         Ok(Self {
             skeleton: forks.skeleton(model, scale),
@@ -130,7 +127,7 @@ impl Forks {
         Ok(forks)
     }
 
-    /// They as a tree in space, the foot at the origin, in a picture that holds all of it.
+    /// They as a tree in space, the foot at the origin.
     fn skeleton(&self, model: &ModelTree, scale: f64) -> Skeleton {
         let foot = model.nodes[0].position;
         let mut nodes: Vec<Node> = Vec::with_capacity(self.of_model.len());
@@ -138,7 +135,6 @@ impl Forks {
         for parent in self.parents.iter().flatten() {
             carries[*parent] = true;
         }
-        let (mut left, mut right, mut bottom) = (0.0_f64, 0.0_f64, 0.0_f64);
         for (i, (of_model, parent)) in self.of_model.iter().zip(&self.parents).enumerate() {
             let level = parent.map_or(0, |p| nodes[p].level.saturating_add(1));
             let parent = parent.map(|p| NodeId(p as u32));
@@ -146,18 +142,8 @@ impl Forks {
             node.position = Point3::from((model.nodes[*of_model].position - foot) * scale);
             node.radius = model.nodes[*of_model].wood.radius * scale;
             node.certainty = if carries[i] && i > 0 { 1.0 } else { 0.0 };
-            left = left.min(node.position.x);
-            right = right.max(node.position.x);
-            bottom = bottom.min(node.position.y);
             nodes.push(node);
         }
-        let foot_px = Point2::new(ROOM_PX - left, ROOM_PX + HEIGHT_PX);
-        let size =
-            [right - left, HEIGHT_PX - bottom].map(|side| (side + 2.0 * ROOM_PX).ceil() as u32);
-        Skeleton {
-            nodes,
-            foot_px,
-            image_size: Size::new(size[0], size[1]),
-        }
+        Skeleton::not_filmed(nodes)
     }
 }

@@ -71,7 +71,7 @@ pub use outline::{Outline, bounds_px};
 pub use participation::{Participation, moves_with, participation, reason};
 pub use point_cloud::{MOST_CLOUD_POINTS, PointCloud};
 pub use pose::{JointMotion, JointPose, Pose};
-pub use skeleton::{FARTHEST_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
+pub use skeleton::{FARTHEST_PX, NOT_FILMED_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 pub use snapshot::{
     BranchRow, CameraState, DepthCameraState, FormatNote, Phase, Snapshot, StillNeeded,
 };

@@ -7,6 +7,10 @@ use nalgebra::{Point2, Point3};
 /// drawn, px.
 pub const FARTHEST_PX: f64 = 1e6;
 
+/// Height of a tree that was not filmed, px, and the room around it in its picture.
+pub const NOT_FILMED_PX: f64 = 720.0;
+const ROOM_PX: f64 = 40.0;
+
 /// Index into [`Skeleton::nodes`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(pub u32);
@@ -161,6 +165,23 @@ impl Skeleton {
 }
 
 impl Skeleton {
+    /// A tree that was not filmed, [`NOT_FILMED_PX`] high, in a picture that holds all of it.
+    pub fn not_filmed(nodes: Vec<Node>) -> Self {
+        let (mut left, mut right, mut bottom) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for node in &nodes {
+            left = left.min(node.position.x);
+            right = right.max(node.position.x);
+            bottom = bottom.min(node.position.y);
+        }
+        let size =
+            [right - left, NOT_FILMED_PX - bottom].map(|side| (side + 2.0 * ROOM_PX).ceil() as u32);
+        Self {
+            nodes,
+            foot_px: Point2::new(ROOM_PX - left, ROOM_PX + NOT_FILMED_PX),
+            image_size: Size::new(size[0], size[1]),
+        }
+    }
+
     /// Number of nodes that were measured; they come first.
     pub fn measured(&self) -> usize {
         self.nodes

@@ -1,12 +1,8 @@
 //! The tree of a point cloud as a skeleton.
 
 use crate::cloud::CloudTree;
-use crate::model::{Node, NodeId, NodeKind, NodeName, Size, Skeleton};
-use nalgebra::{Point2, Point3};
-
-/// Height of the tree, px, and the room around it: as of other trees that were not filmed.
-const HEIGHT_PX: f64 = 720.0;
-const ROOM_PX: f64 = 40.0;
+use crate::model::{NOT_FILMED_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
+use nalgebra::Point3;
 
 /// A skeleton and its scale.
 #[derive(Clone, Debug)]
@@ -19,7 +15,7 @@ pub struct ScaledTree {
 /// from fork to fork, with bends.
 pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
     let foot = tree.nodes.first().map_or(Point3::origin(), |n| n.position);
-    let px_per_metre = HEIGHT_PX / tree.figures.height_m;
+    let px_per_metre = NOT_FILMED_PX / tree.figures.height_m;
     let mut children = vec![0_usize; tree.nodes.len()];
     for parent in tree.nodes.iter().filter_map(|n| n.parent) {
         children[parent] += 1;
@@ -47,20 +43,8 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
             moves_with: (movers[i] != i).then_some(NodeId(movers[i] as u32)),
         });
     }
-    let [left, right] = [-1.0, 1.0].map(|side| {
-        side * nodes
-            .iter()
-            .map(|n| side * n.position.x)
-            .fold(0.0, f64::max)
-    });
-    let bottom = nodes.iter().map(|n| n.position.y).fold(0.0, f64::min);
-    let size = [right - left, HEIGHT_PX - bottom].map(|side| (side + 2.0 * ROOM_PX).ceil() as u32);
     ScaledTree {
-        skeleton: Skeleton {
-            nodes,
-            foot_px: Point2::new(ROOM_PX - left, ROOM_PX + HEIGHT_PX),
-            image_size: Size::new(size[0], size[1]),
-        },
+        skeleton: Skeleton::not_filmed(nodes),
         metres_per_px: 1.0 / px_per_metre,
     }
 }
@@ -107,7 +91,7 @@ mod tests {
         };
         let scaled = stand_scanned(&tree);
         let nodes = &scaled.skeleton.nodes;
-        assert_eq!(scaled.metres_per_px * HEIGHT_PX, 4.0);
+        assert_eq!(scaled.metres_per_px * NOT_FILMED_PX, 4.0);
         assert_eq!(nodes[2].position, Point3::new(0.0, 360.0, -180.0));
         assert_eq!(nodes[2].radius, 18.0);
         let levels: Vec<u8> = nodes.iter().map(|n| n.level).collect();
