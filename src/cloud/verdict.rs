@@ -83,8 +83,8 @@ fn bough(figures: &CloudFigures) -> Option<Finding> {
 fn beside_crown(figures: &CloudFigures) -> Option<Finding> {
     (figures.beside_crown && !may_be_of_crown(figures)).then(|| Finding {
         grade: Grade::Fair,
-        reason: "no ground was scanned, and another tree of the cloud may be part of a crown without its trunk: it may be \
-                 another part"
+        reason: "no ground was scanned, and another tree of the cloud may be part of a crown without its \
+                 trunk: it may be another part"
             .to_owned(),
         advice: "scan the trunk down to the ground, and leave some ground in the cloud".to_owned(),
     })

@@ -3,14 +3,13 @@
 //! and after every stroke by a screen.
 
 use super::certainty::Certainty;
-use super::settling::{Settling, SmallLook};
+use super::settling::{Settling, SmallLook, lies_on};
 use super::unaided::{Attempt, Half, Place};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
-use crate::signal::distance_to_segment;
 use crate::wood::{self, LeafColour, LeafHint, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
@@ -223,19 +222,16 @@ impl Looked<'_> {
             // In the whole picture it is found, or why it is not.
             Err(_) => return self.see(drawn),
         };
+        let beside_px = wood::BESIDE_STROKE * f64::from(self.picture.size.width);
         let trunk = match settling.trunk(look) {
-            Ok(trunk) if leads_along(&trunk, &drawn.strokes[0], self.picture.size) => trunk,
+            // No corner of the line is farther off than branches are looked for beside a stroke.
+            Ok(trunk) if lies_on(&drawn.strokes[0], &trunk, beside_px) => trunk,
             Err(NotSeen::Cancelled) => return Err(PhotoError::Cancelled),
             Ok(_) | Err(_) => return self.see(drawn),
         };
         let strokes = drawn.strokes.clone();
-        let mut settled = drawn.clone();
-        settled.strokes[0] = trunk;
-        match self.see(settled) {
-            Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
-            Err(_) => self.see(drawn),
-            Ok(tree) => Ok(TreeInPhoto { strokes, ..tree }),
-        }
+        let tree = self.see_settled(drawn, trunk)?;
+        Ok(TreeInPhoto { strokes, ..tree })
     }
 
     /// Of all attempts to find what was not drawn the one that is most likely right.
@@ -312,26 +308,19 @@ impl Looked<'_> {
         first: SmallLook,
     ) -> Result<TreeInPhoto, PhotoError> {
         let trunk = settling.trunk(first).map_err(|e| not_seen(e, self.drawn))?;
-        let settled = Attempt {
-            crown: attempt.crown.clone(),
-            strokes: vec![trunk],
-        };
+        self.see_settled(attempt, trunk)
+    }
+
+    /// The tree along a settled trunk, or as the attempt has it if nothing is seen there.
+    fn see_settled(&self, attempt: Attempt, trunk: Stroke) -> Result<TreeInPhoto, PhotoError> {
+        let mut settled = attempt.clone();
+        settled.strokes[0] = trunk;
         match self.see(settled) {
             Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
             Err(_) => self.see(attempt),
             tree => tree,
         }
     }
-}
-
-/// Whether a trunk leads along a line that was drawn for it: no corner of that is farther from it than branches
-/// are looked for beside a stroke.
-fn leads_along(trunk: &Stroke, drawn: &Stroke, size: Size) -> bool {
-    let beside_px = wood::BESIDE_STROKE * f64::from(size.width);
-    drawn.iter().all(|at| {
-        let mut pieces = trunk.windows(2);
-        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= beside_px)
-    })
 }
 
 /// An attempt that was looked at for the first time.

@@ -1,9 +1,10 @@
 //! The trunk of a tree that is drawn, or found and bare, made sure of in a smaller picture.
 //!
 //! The line that a trunk is found by may lie on the dark side of its bark, and ends below the crown; one that
-//! is drawn runs beside its middle, and ends where the hand stopped. By its colours alone wood is found with holes, and too thin. Colours are learned anew along the middle of what was
-//! taken for wood until that stays (in turns, as Rother et al. 2004 sect. 3). Where the trunk and its limbs run
-//! is seen in a small picture as well, in a quarter of the time.
+//! is drawn runs beside its middle, and ends where the hand stopped. By its colours alone wood is found with
+//! holes, and too thin. Colours are learned anew along the middle of what was taken for wood until that stays
+//! (in turns, as Rother et al. 2004 sect. 3). Where the trunk and its limbs run is seen in a small picture as
+//! well, in a quarter of the time.
 
 use super::photograph::PhotoOptions;
 use super::unaided::Attempt;
@@ -102,7 +103,8 @@ impl<'a> Settling<'a> {
             let way_px = branches.longest_way_px(by.unwrap_or(0));
             let is_drawn_well = by.is_some()
                 && small.strokes.first().is_some_and(|drawn| {
-                    lies_on(drawn, &way_px) && length_px(drawn) >= LONG * length_px(&way_px)
+                    lies_on(drawn, &way_px, STAYS_PX)
+                        && length_px(drawn) >= LONG * length_px(&way_px)
                 });
             if is_drawn_well {
                 break;
@@ -110,7 +112,7 @@ impl<'a> Settling<'a> {
             let stays = small
                 .strokes
                 .first()
-                .is_none_or(|line| lies_on(&way_px, line));
+                .is_none_or(|line| lies_on(&way_px, line, STAYS_PX));
             match small.strokes.first_mut() {
                 Some(trunk) => *trunk = way_px,
                 None => small.strokes.push(way_px),
@@ -164,11 +166,11 @@ pub struct SmallLook {
     drawn_to: Option<Point2<f64>>,
 }
 
-/// Whether all corners of a line are on another one.
-fn lies_on(line: &Stroke, other: &Stroke) -> bool {
+/// Whether all corners of a line are within so much of another one, px.
+pub fn lies_on(line: &Stroke, other: &Stroke, within_px: f64) -> bool {
     line.iter().all(|at| {
         let mut pieces = other.windows(2);
-        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= STAYS_PX)
+        pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= within_px)
     })
 }
 
@@ -187,7 +189,9 @@ mod tests {
     #[test]
     fn a_line_stays_if_all_its_corners_do() {
         let line = points(&[[10.0, 90.0], [10.0, 10.0]]);
-        assert!(lies_on(&points(&[[11.0, 80.0], [9.0, 40.0]]), &line));
-        assert!(!lies_on(&points(&[[11.0, 80.0], [20.0, 10.0]]), &line));
+        let near = points(&[[11.0, 80.0], [9.0, 40.0]]);
+        assert!(lies_on(&near, &line, STAYS_PX));
+        let far = points(&[[11.0, 80.0], [20.0, 10.0]]);
+        assert!(!lies_on(&far, &line, STAYS_PX));
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::model::{MovingBranch, NodeId, Skeleton};
 use nalgebra::{Point3, Vector2, Vector3};
+use std::collections::BTreeMap;
 
 /// Directions that are tried, evenly from the steepest towards the viewer to the steepest away.
 const DIRECTIONS: i32 = 36;
@@ -58,7 +59,7 @@ pub fn set_side_depths_apart(tree: &mut Skeleton) {
     if !is_side.contains(&true) {
         return;
     }
-    let strokes = side_strokes(tree, &is_side);
+    let mut strokes = side_strokes(tree, &is_side);
     let flat = tree.clone();
     let mut placed: Vec<Point3<f64>> = Vec::new();
     for (node, is_side) in flat.nodes.iter().zip(&is_side) {
@@ -73,10 +74,7 @@ pub fn set_side_depths_apart(tree: &mut Skeleton) {
             continue;
         };
         let piece = flat.nodes[i].position - flat.nodes[parent].position;
-        if let Some(stroke) = strokes
-            .iter()
-            .find(|stroke| stroke.nodes.first() == Some(&i))
-        {
+        if let Some(stroke) = strokes.remove(&i) {
             let from = tree.nodes[parent].position;
             let way = Way {
                 from,
@@ -85,8 +83,8 @@ pub fn set_side_depths_apart(tree: &mut Skeleton) {
             };
             let slope = way.most_apart(STEEPEST_SIDE_DEG, &placed);
             placed.extend(samples(from, way.at_slope(slope)));
-            for node in &stroke.nodes {
-                slopes[*node] = slope;
+            for node in stroke.nodes {
+                slopes[node] = slope;
             }
         }
         tree.nodes[i].position.z =
@@ -107,8 +105,8 @@ impl SideStroke {
     }
 }
 
-/// The strokes of side wood, each after the one that it leaves.
-fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
+/// The strokes of side wood, by the node in which the first piece of each ends.
+fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> BTreeMap<usize, SideStroke> {
     // How far side wood reaches from each node on, and by which child it reaches farthest.
     let mut farthest: Vec<(f64, Option<usize>)> = vec![(0.0, None); tree.nodes.len()];
     for i in (1..tree.nodes.len()).rev().filter(|i| is_side[*i]) {
@@ -120,7 +118,7 @@ fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
             farthest[parent] = (reach_px, Some(i));
         }
     }
-    let mut strokes = Vec::new();
+    let mut strokes = BTreeMap::new();
     for i in (1..tree.nodes.len()).filter(|i| is_side[*i]) {
         let parent = tree.nodes[i].parent.map_or(0, |p| p.index());
         if is_side[parent] && farthest[parent].1 == Some(i) {
@@ -130,10 +128,8 @@ fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> Vec<SideStroke> {
         while let Some(next) = farthest[nodes[nodes.len() - 1]].1 {
             nodes.push(next);
         }
-        strokes.push(SideStroke {
-            length_px: nodes.iter().map(|node| piece_px(tree, *node)).sum(),
-            nodes,
-        });
+        let length_px = nodes.iter().map(|node| piece_px(tree, *node)).sum();
+        strokes.insert(i, SideStroke { nodes, length_px });
     }
     strokes
 }
