@@ -193,8 +193,8 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
             "arborcam: note: the cloud holds no ground; the lowest wood counts as the foot",
         );
     }
-    print_summary(&args.out, &tree, branches);
     scan.say_unit("the tree", tree.figures.height_m);
+    print_summary(&args.out, &tree, branches);
     Ok(())
 }
 

@@ -20,8 +20,8 @@ use crate::document::{
 use crate::dynamics::Take;
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Background, CameraState, Origin, Outline, Picture, Pose, Rgb, Skeleton, TagScale,
-    Tentative, Timing, TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
+    AtRest, Background, CameraState, Gap, GapCause, Origin, Outline, Picture, Pose, Rgb, Skeleton,
+    TagScale, Tentative, Timing, TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
 use crate::solve::{Model, with_modes};
@@ -71,6 +71,20 @@ impl Quality {
     pub fn from_now(camera: &CameraState) -> Self {
         Self {
             away_before: Absences::of(camera),
+            ..Self::default()
+        }
+    }
+
+    /// For points that were followed from `time_s` of a film on that has been filmed, s since its first
+    /// frame.
+    pub fn since(time_s: f64, timing: &Timing) -> Self {
+        let gaps = timing.gaps.iter();
+        let before = gaps.filter(|gap| gap.cause != GapCause::Dropped && gap.time_s < time_s);
+        Self {
+            away_before: Absences {
+                count: before.clone().count() as u64,
+                seconds: before.map(|gap| gap.length_s).sum(),
+            },
             ..Self::default()
         }
     }

@@ -249,17 +249,19 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
     let mut back = BackEnd::new(&note.config);
     back.put_wood(wood);
     back.put_asked(asked);
-    let mut quality = Quality::default();
+    let mut quality = None;
     for set in tracks.sets() {
         if cancel.is_cancelled() {
             return Err(Failure::Stopped);
         }
         let tracks = set.map_err(Failure::Log)?;
-        quality.note(
-            &tracks,
-            median_fb_error_px(&tracks),
-            median_error_px(&tracks),
-        );
+        quality
+            .get_or_insert_with(|| Quality::since(tracks.time_s, &note.timing))
+            .note(
+                &tracks,
+                median_fb_error_px(&tracks),
+                median_error_px(&tracks),
+            );
         back.step(Followed {
             tracks,
             outline: outline.clone(),
@@ -286,7 +288,7 @@ pub fn finish_unfinished(out: &Path, cancel: &CancelToken) -> Result<Written, Fa
         asked: back.asked().clone(),
         info,
         config,
-        quality,
+        quality: quality.unwrap_or_default(),
         picture,
         tag: note.tag,
         shared,

@@ -25,6 +25,11 @@ pub(super) fn write(
     is_stopped: &AtomicBool,
 ) -> Result<(), CommandError> {
     print_found(scan, &found);
+    let trees = found.trees.iter().flatten();
+    let highest = trees.max_by(|a, b| a.figures.height_m.total_cmp(&b.figures.height_m));
+    if let Some(highest) = highest {
+        scan.say_unit("the highest tree", highest.figures.height_m);
+    }
     let mut standing = Vec::with_capacity(found.trees.len());
     for (number, tree) in (1..).zip(&found.trees) {
         let name = tree_name(number);
@@ -41,11 +46,6 @@ pub(super) fn write(
         let dir = args.out.join(name);
         drawn.write(&dir, is_stopped)?;
         print_summary(&dir, tree, branches);
-    }
-    let trees = found.trees.iter().flatten();
-    let highest = trees.max_by(|a, b| a.figures.height_m.total_cmp(&b.figures.height_m));
-    if let Some(highest) = highest {
-        scan.say_unit("the highest tree", highest.figures.height_m);
     }
     let Some(forest) = scan_forest(&scan.name, &standing, &found, scan.config.wood.seed.into())
     else {

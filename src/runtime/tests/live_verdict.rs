@@ -2,7 +2,9 @@
 
 use super::*;
 use crate::config::Config;
-use crate::model::{Agreement, Background, Observation, Size, TrackId, TrackSet};
+use crate::model::{
+    Agreement, Background, Gap, GapCause, Observation, Size, Timing, TrackId, TrackSet,
+};
 use crate::pipeline::Followed;
 use std::time::{Duration, Instant};
 
@@ -169,6 +171,36 @@ fn absences_count_from_where_points_are_followed() {
         assert!(length.rate_hz.is_some());
     }
     assert_eq!(film.quality.length(&away(9, 90.0)).rate_hz, None);
+}
+
+/// A film that is finished later knows its absences by the holes that are listed.
+#[test]
+fn absences_before_the_first_points_are_found_among_the_gaps() {
+    let gaps = vec![
+        gap(1.0, 0.5, GapCause::Dropped),
+        gap(2.0, 20.0, GapCause::Disconnected),
+        gap(24.0, 10.0, GapCause::Silent),
+        gap(41.0, 4.0, GapCause::Disconnected),
+    ];
+    let timing = Timing {
+        gaps,
+        ..Timing::default()
+    };
+    let mut film = Film::new(4, 10.0);
+    film.quality = Quality::since(40.0, &timing);
+    film.film(11.0);
+    let length = film.quality.length(&away(3, 34.0));
+    assert!((length.seconds - 7.0).abs() < 0.05, "{length:?}");
+}
+
+/// A hole of `length_s` in a film from `time_s` on.
+fn gap(time_s: f64, length_s: f64, cause: GapCause) -> Gap {
+    Gap {
+        time_s,
+        length_s,
+        cause,
+        ..Gap::default()
+    }
 }
 
 /// A camera that was away so often, and so long in all.
