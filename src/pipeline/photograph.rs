@@ -10,8 +10,10 @@ use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
-use crate::wood::{self, LeafColour, LeafHint, NotSeen, SeenInPhotograph, Stroke};
+use crate::wood::{self, LeafColour, LeafHint, LeavesSeen, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
+use std::panic::resume_unwind;
+use std::thread;
 
 /// Gaps between leaves up to this share of the photograph's width are closed; up to the second where one
 /// piece then has nearly all.
@@ -79,7 +81,7 @@ pub enum PhotoError {
     NoCrown,
     #[error("the crown stroke and the trunk are apart; draw both on the same tree")]
     CrownApart,
-    #[error("the crown has no {} leaves; name their colour, or none", .colour.name())]
+    #[error("the crown has no {} leaves; name their colour, or say that it is bare", .colour.name())]
     NoLeaves { colour: LeafColour },
     #[error("no tree with a trunk is found in its middle; draw its crown and its trunk")]
     NoTree,
@@ -183,15 +185,26 @@ struct Looked<'a> {
 impl Looked<'_> {
     /// The tree along these strokes.
     fn see(&self, strokes: Attempt) -> Result<TreeInPhoto, PhotoError> {
-        let Attempt { crown, strokes } = strokes;
-        let view = wood::Photograph {
+        let leaves = LeavesSeen::of(self.view(&strokes), self.cancel)
+            .map_err(|e| not_seen(e, self.drawn))?;
+        self.see_beside(&leaves, strokes)
+    }
+
+    fn view<'b>(&'b self, strokes: &'b Attempt) -> wood::Photograph<'b> {
+        wood::Photograph {
             picture: self.picture,
-            crown: &crown,
-            strokes: &strokes,
+            crown: &strokes.crown,
+            strokes: &strokes.strokes,
             leaves: self.options.leaves,
             trace_by: self.options.trace_by,
-        };
-        let seen = wood::in_photograph(view, self.cancel).map_err(|e| not_seen(e, self.drawn))?;
+        }
+    }
+
+    /// The tree along these strokes, the leaves of which were found.
+    fn see_beside(&self, leaves: &LeavesSeen, strokes: Attempt) -> Result<TreeInPhoto, PhotoError> {
+        let seen = wood::beside_leaves(self.view(&strokes), leaves, self.cancel)
+            .map_err(|e| not_seen(e, self.drawn))?;
+        let Attempt { crown, strokes } = strokes;
         let branches = &seen.wood.branches;
         let size = self.picture.size;
         for (number, stroke) in (1..).zip(&strokes) {
@@ -212,26 +225,40 @@ impl Looked<'_> {
         })
     }
 
-    /// The tree along drawn strokes. The trunk settles from its stroke; it is as it was drawn where that leads
-    /// away from the stroke.
+    /// The tree along drawn strokes. The trunk settles from its stroke, while the leaves are found in the whole
+    /// picture.
     fn along_drawn(&self, drawn: Attempt) -> Result<TreeInPhoto, PhotoError> {
+        let (leaves, trunk) = thread::scope(|scope| {
+            let leaves = scope.spawn(|| LeavesSeen::of(self.view(&drawn), self.cancel));
+            let trunk = self.trunk_along(&drawn);
+            let leaves = leaves.join().unwrap_or_else(|panic| resume_unwind(panic));
+            (leaves, trunk)
+        });
+        let leaves = leaves.map_err(|e| not_seen(e, self.drawn))?;
+        match trunk? {
+            Some(trunk) => {
+                let strokes = drawn.strokes.clone();
+                let tree = self.see_settled(&leaves, drawn, trunk)?;
+                Ok(TreeInPhoto { strokes, ..tree })
+            }
+            None => self.see_beside(&leaves, drawn),
+        }
+    }
+
+    /// The line at which a drawn trunk settles; `None` where that leads away from the stroke, or nothing is seen
+    /// in a smaller picture.
+    fn trunk_along(&self, drawn: &Attempt) -> Result<Option<Stroke>, PhotoError> {
         let settling = Settling::of(self.picture, self.options, self.cancel).map_err(failed)?;
-        let look = match settling.look_at_drawn(&drawn) {
-            Ok(look) => look,
-            Err(NotSeen::Cancelled) => return Err(PhotoError::Cancelled),
-            // In the whole picture it is found, or why it is not.
-            Err(_) => return self.see(drawn),
-        };
         let beside_px = wood::BESIDE_STROKE * f64::from(self.picture.size.width);
-        let trunk = match settling.trunk(look) {
-            // No corner of the line is farther off than branches are looked for beside a stroke.
-            Ok(trunk) if lies_on(&drawn.strokes[0], &trunk, beside_px) => trunk,
-            Err(NotSeen::Cancelled) => return Err(PhotoError::Cancelled),
-            Ok(_) | Err(_) => return self.see(drawn),
-        };
-        let strokes = drawn.strokes.clone();
-        let tree = self.see_settled(drawn, trunk)?;
-        Ok(TreeInPhoto { strokes, ..tree })
+        let look = settling.look_at_drawn(drawn);
+        match look.and_then(|look| settling.trunk(look)) {
+            // No corner of the stroke is farther off than branches are looked for beside it.
+            Ok(trunk) => {
+                Ok(Some(trunk).filter(|trunk| lies_on(&drawn.strokes[0], trunk, beside_px)))
+            }
+            Err(NotSeen::Cancelled) => Err(PhotoError::Cancelled),
+            Err(_) => Ok(None),
+        }
     }
 
     /// Of all attempts to find what was not drawn the one that is most likely right.
@@ -308,16 +335,23 @@ impl Looked<'_> {
         first: SmallLook,
     ) -> Result<TreeInPhoto, PhotoError> {
         let trunk = settling.trunk(first).map_err(|e| not_seen(e, self.drawn))?;
-        self.see_settled(attempt, trunk)
+        let leaves = LeavesSeen::of(self.view(&attempt), self.cancel)
+            .map_err(|e| not_seen(e, self.drawn))?;
+        self.see_settled(&leaves, attempt, trunk)
     }
 
     /// The tree along a settled trunk, or as the attempt has it if nothing is seen there.
-    fn see_settled(&self, attempt: Attempt, trunk: Stroke) -> Result<TreeInPhoto, PhotoError> {
+    fn see_settled(
+        &self,
+        leaves: &LeavesSeen,
+        attempt: Attempt,
+        trunk: Stroke,
+    ) -> Result<TreeInPhoto, PhotoError> {
         let mut settled = attempt.clone();
         settled.strokes[0] = trunk;
-        match self.see(settled) {
+        match self.see_beside(leaves, settled) {
             Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
-            Err(_) => self.see(attempt),
+            Err(_) => self.see_beside(leaves, attempt),
             tree => tree,
         }
     }

@@ -6,7 +6,7 @@
 //! [`mask`] classifies pixels as wood or not by colour ([`bark_colour`], [`leaves`]) and by [`ridges`];
 //! [`paths`], or [`circles`] as in the paper,
 //! draw the centre lines; [`probability`] says how sure each pixel is; [`bark`] unrolls the trunk.
-//! Strokes help where colour does not. [`in_photograph`] is the paper's own case: one picture, and
+//! Strokes help where colour does not. [`beside_leaves`] is the paper's own case: one picture, and
 //! strokes in place of motion; [`foliage`] finds its leaves, and [`contrast`] says whether a stroke is on
 //! anything, [`crown`] whether it is round a crown. Without strokes a crown in leaf is looked for in
 //! [`greenery`].
@@ -40,7 +40,7 @@ mod ways;
 pub use foliage::{LeafColour, LeafHint};
 pub use greenery::greenery;
 pub use photograph::{
-    BESIDE_STROKE, LeavesSeen, NotSeen, Photograph, SeenInPhotograph, beside_leaves, in_photograph,
+    BESIDE_STROKE, LeavesSeen, NotSeen, Photograph, SeenInPhotograph, beside_leaves,
 };
 
 use crate::cancel::CancelToken;

@@ -171,19 +171,11 @@ impl LeavesSeen {
     }
 }
 
-/// Finds the wood and the leaves.
+/// Finds the wood beside leaves, which were found with the same crown, perhaps with other strokes along the
+/// branches.
 ///
 /// # Errors
 /// The strokes are not on a tree, `cancel` ends the work, or OpenCV fails.
-pub fn in_photograph(photo: Photograph, cancel: &CancelToken) -> Result<SeenInPhotograph, NotSeen> {
-    let leaves = LeavesSeen::of(photo, cancel)?;
-    beside_leaves(photo, &leaves, cancel)
-}
-
-/// The wood beside leaves that were found before, perhaps with other strokes along the branches.
-///
-/// # Errors
-/// As of [`in_photograph`].
 pub fn beside_leaves(
     photo: Photograph,
     seen: &LeavesSeen,
@@ -496,7 +488,8 @@ mod tests {
             leaves: LeafHint::Unknown,
             trace_by: TraceBy::Paths,
         };
-        in_photograph(photo, &CancelToken::new())
+        let leaves = LeavesSeen::of(photo, &CancelToken::new())?;
+        beside_leaves(photo, &leaves, &CancelToken::new())
     }
 
     #[test]
