@@ -11,7 +11,7 @@ use super::command_error::CommandError;
 use super::hangup::SighupAction;
 use super::output::eprint_line;
 use super::render::{self, write_error};
-use super::session::stop_on_signals;
+use super::signals::stop_on_signals;
 use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
 use crate::animate::{

@@ -32,6 +32,7 @@ mod scale;
 mod service;
 mod session;
 mod shape;
+mod signals;
 mod sketch;
 mod stop;
 mod strokes;

@@ -4,7 +4,8 @@ use super::command_error::CommandError;
 use super::common::check_fps;
 use super::hangup::SighupAction;
 use super::output::eprint_line;
-use super::session::{init_log, stop_on_signals};
+use super::session::init_log;
+use super::signals::stop_on_signals;
 use crate::config::Config;
 use crate::runtime::{self, Played};
 use crate::source::{self, Loopback, Source, SourceError};
@@ -29,7 +30,7 @@ pub struct PlayArgs {
 
 pub fn run(args: &PlayArgs) -> Result<(), CommandError> {
     check_fps(args.fps)?;
-    let stop = stop_on_signals(SighupAction::ends_this_process())?;
+    let stop = stop_on_signals(SighupAction::ends_this_process(), None)?;
     init_log(true);
     let mut output = None;
     let mut frames = 0;

@@ -7,7 +7,8 @@ use super::hangup::SighupAction;
 use super::notes::NoteArgs;
 use super::output::eprint_line;
 use super::recording::{self, LimitArgs, parse_time_ns};
-use super::session::{init_log, stop_on_signals, warn_of_other_format};
+use super::session::{init_log, warn_of_other_format};
+use super::signals::stop_on_signals;
 use crate::config::Config;
 use crate::runtime::{self, Failure, Pace, RecordJob, RunningRecord};
 use clap::Args;
@@ -53,7 +54,7 @@ pub fn run(args: &RecordArgs) -> Result<(), CommandError> {
     let info = source.describe();
     check_depth(&args.camera, &info)?;
     let notes = args.notes.over(&*source)?;
-    let stop = stop_on_signals(SighupAction::ends_this_process())?;
+    let stop = stop_on_signals(SighupAction::ends_this_process(), None)?;
     init_log(true);
     warn_of_other_format(&info);
     let pace = if info.live {

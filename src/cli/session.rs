@@ -1,12 +1,13 @@
 //! One run of `capture` or `replay`: opens the source, runs the capture, shows it, reports the end.
 
 use super::camera::{CameraArgs, check_depth};
-use super::command_error::{CommandError, FAILED};
+use super::command_error::CommandError;
 use super::common::Common;
 use super::hangup::{Reload, SighupAction};
 use super::output::eprint_line;
 use super::recording::{self, RecordOption};
 use super::service::Service;
+use super::signals::stop_on_signals;
 use super::supervisor::CaptureSupervisor;
 use crate::config::Config;
 use crate::files::OutputFolder;
@@ -15,12 +16,9 @@ use crate::runtime::{self, Failure, Job, Pace, Running, Summary};
 use crate::source::{Source, SourceInfo};
 use crate::tui;
 use anyhow::anyhow;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag::{register, register_conditional_shutdown};
 use std::io::IsTerminal;
 use std::path::Path;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Interval of preview pictures with and without a screen.
@@ -52,11 +50,13 @@ impl Plan<'_> {
 pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let config = common.config(plan.camera)?;
     let headless = common.headless || common.stream.is_some();
-    check_arguments(common, &plan, headless)?;
+    check_arguments(common, &plan)?;
     let source = runtime::open(plan.input, &config, plan.fps).map_err(CommandError::no_input)?;
+    check_terminal(headless)?;
     let job = job(common, &plan, config, &*source, headless)?;
     let action = SighupAction::of_this_process();
-    let stop = stop_on_signals(action == SighupAction::Stop)?;
+    let unfinished = common.out.as_deref().map(runtime::unfinished_dir);
+    let stop = stop_on_signals(action == SighupAction::Stop, unfinished)?;
     if headless {
         warn_of_other_format(&source.describe());
     }
@@ -86,13 +86,17 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
 }
 
-/// Checks, before anything is filmed, what would otherwise only fail at the end.
-fn check_arguments(common: &Common, plan: &Plan, headless: bool) -> Result<(), CommandError> {
-    if !headless && !std::io::stdout().is_terminal() {
-        return Err(CommandError::BadUsage(
-            tui::TuiError::NoTerminal(None).into(),
-        ));
+/// A screen needs a terminal.
+fn check_terminal(headless: bool) -> Result<(), CommandError> {
+    if headless || std::io::stdout().is_terminal() {
+        return Ok(());
     }
+    let why = tui::TuiError::NoTerminal(None);
+    Err(CommandError::BadUsage(why.into()))
+}
+
+/// Checks, before anything is filmed, what would otherwise only fail at the end.
+fn check_arguments(common: &Common, plan: &Plan) -> Result<(), CommandError> {
     common.shape.reject_image_envelope()?;
     common.notes.check()?;
     if let Some(dir) = &common.out {
@@ -178,33 +182,6 @@ fn last_messages(running: &Running, headless: bool) -> Vec<String> {
     }
     let warnings = running.warnings();
     warnings.iter().map(|w| format!("warning: {w}")).collect()
-}
-
-/// The signals that end a command; SIGHUP only if `by_hangup`.
-pub fn ending_signals(by_hangup: bool) -> Vec<i32> {
-    let mut signals = vec![SIGINT, SIGTERM];
-    if by_hangup {
-        signals.push(SIGHUP);
-    }
-    signals
-}
-
-/// A flag that is set by the signals that end a command; by SIGHUP only if `by_hangup`.
-///
-/// # Errors
-/// The signals cannot be caught.
-pub fn stop_on_signals(by_hangup: bool) -> Result<Arc<AtomicBool>, CommandError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    for signal in ending_signals(by_hangup) {
-        // A second signal ends the program at once, without a capture: otherwise nothing could end
-        // it while a disk hangs. A closed terminal hangs up twice, itself and through its shell.
-        if signal != SIGHUP {
-            register_conditional_shutdown(signal, i32::from(FAILED), stop.clone())
-                .map_err(CommandError::failed)?;
-        }
-        register(signal, stop.clone()).map_err(CommandError::failed)?;
-    }
-    Ok(stop)
 }
 
 /// Sends log messages to standard error, unless they would overwrite a screen on the terminal.

@@ -2,7 +2,7 @@
 
 use super::command_error::{CommandError, STOPPED};
 use super::hangup::SighupAction;
-use super::session::{ending_signals, stop_on_signals};
+use super::signals::{ending_signals, stop_on_signals};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -29,7 +29,7 @@ impl Stop {
         }
         Ok(Self {
             at_once,
-            requested: stop_on_signals(by_hangup)?,
+            requested: stop_on_signals(by_hangup, None)?,
         })
     }
 

@@ -76,6 +76,11 @@ impl Guard {
     }
 }
 
+/// Gives the terminal back, if a screen has it, before the program ends at once.
+pub fn give_terminal_back() {
+    restore("");
+}
+
 fn hook_panics() {
     let print = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {

@@ -35,6 +35,7 @@ mod wood;
 pub use abilities::{Abilities, abilities, columns};
 pub use count_bar::CountBar;
 pub use graphics::Preview;
+pub use guard::give_terminal_back;
 pub use moving::{AnimationCommand, Moving, watch};
 pub use opened::{Options, TuiError};
 pub use photo::{FoundTree, PhotoSession, draw_on_photo};

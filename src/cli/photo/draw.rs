@@ -6,7 +6,7 @@ use super::picture::ShownPicture;
 use crate::cli::command_error::CommandError;
 use crate::cli::hangup::SighupAction;
 use crate::cli::output::eprint_line;
-use crate::cli::session::stop_on_signals;
+use crate::cli::signals::stop_on_signals;
 use crate::model::{Rgb, TreeStrokes};
 use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 use crate::runtime::{Answer, Asked};
@@ -92,7 +92,7 @@ pub fn on_screen(
         let why = "there is no terminal to draw on; give --crown and --branch, or --tree, instead of --draw";
         return Err(CommandError::BadUsage(anyhow!(why)));
     }
-    let stop = stop_on_signals(SighupAction::ends_this_process())?;
+    let stop = stop_on_signals(SighupAction::ends_this_process(), None)?;
     let mut session = OnScreen {
         shown,
         options,
