@@ -91,7 +91,7 @@ fn show_live(args: &AnimateArgs) -> Result<(), CommandError> {
             Box::new(WindAnimation::new(&tree, animator))
         }
     };
-    let stop = stop_on_signals(SighupAction::ends_this_process())?;
+    let stop = stop_on_signals(SighupAction::ends_this_process(), None)?;
     tui::watch(&mut *moving, tui::Options::from_env(), &stop).map_err(CommandError::bad_usage)?;
     if stop.load(Ordering::SeqCst) {
         Err(CommandError::Stopped)

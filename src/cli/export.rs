@@ -95,6 +95,22 @@ enum Format {
     Treefile,
 }
 
+impl Format {
+    /// What its main file ends in; `None` for a folder.
+    fn suffix(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::Glb => "glb",
+            Self::Html => "html",
+            Self::Gltf => "gltf",
+            Self::Obj => "obj",
+            Self::Ply => "ply",
+            Self::Qsm => "csv",
+            Self::Treefile => "txt",
+            Self::Csv => return None,
+        })
+    }
+}
+
 /// Parses `--height`, m.
 fn height(text: &str) -> Result<f64, String> {
     parse_within(
@@ -253,19 +269,19 @@ impl<'a> Target<'a> {
                 "--out {shown} is no name for a file; choose another"
             ));
         }
-        let ending = match args.format {
-            Format::Gltf => "gltf",
-            Format::Obj => "obj",
-            _ => return Ok(Self::File(&args.out)),
+        let Some(own) = args.format.suffix() else {
+            return Ok(Self::File(&args.out));
         };
-        // The other files are named after it.
-        if args
-            .out
-            .extension()
-            .is_none_or(|e| !e.eq_ignore_ascii_case(ending))
-        {
+        let ending = args.out.extension().unwrap_or_default();
+        let suffixes = Format::value_variants().iter().filter_map(Format::suffix);
+        let is_known = suffixes
+            .clone()
+            .any(|known| ending.eq_ignore_ascii_case(known));
+        // Others are named after it.
+        let is_several = matches!(args.format, Format::Gltf | Format::Obj);
+        if !ending.eq_ignore_ascii_case(own) && (is_known || is_several) {
             return bad_usage(format!(
-                "--out {shown} does not end in .{ending}, as this format must"
+                "--out {shown} does not end in .{own}, as this format must"
             ));
         }
         Ok(Self::File(&args.out))

@@ -69,11 +69,13 @@ pub fn draw(
 ) -> Result<(), CommandError> {
     let studio = Studio::new(tree, shot)?;
     match kind {
-        Kind::Picture => {
-            let png = studio.picture()?;
-            write_picture(out, &png, stop).map_err(write_error)
+        Kind::Picture => write_picture(out, &studio.picture()?, stop),
+        Kind::Video => {
+            let written = studio.video(out, stop.while_writing());
+            written.map_err(video_error)?;
+            print_written(out);
+            Ok(())
         }
-        Kind::Video => studio.video(out, stop.while_writing()).map_err(video_error),
     }
 }
 
@@ -87,16 +89,29 @@ pub fn draw_forest(
 ) -> Result<(), CommandError> {
     let studio = ForestStudio::new(forest, shot)?;
     match kind {
-        Kind::Picture => write_picture(out, &studio.picture()?, stop).map_err(write_error),
-        Kind::Video => studio.video(out, stop.while_writing()).map_err(video_error),
+        Kind::Picture => write_picture(out, &studio.picture()?, stop),
+        Kind::Video => {
+            let written = studio.video(out, stop.while_writing());
+            written.map_err(video_error)?;
+            print_written(out);
+            Ok(())
+        }
     }
 }
 
-fn write_picture(out: &Path, png: &[u8], stop: &Stop) -> Result<(), WriteError> {
+fn write_picture(out: &Path, png: &[u8], stop: &Stop) -> Result<(), CommandError> {
     let stop = stop.while_writing();
-    let file = OutputFile::create(out)?;
-    file.write(png, stop)?;
-    file.publish()
+    let file = OutputFile::create(out).map_err(write_error)?;
+    file.write(png, stop).map_err(write_error)?;
+    file.publish().map_err(write_error)?;
+    print_written(out);
+    Ok(())
+}
+
+/// The line of a file that is there now.
+fn print_written(out: &Path) {
+    let size = std::fs::metadata(out).map_or(0, |file| file.len());
+    eprint_line(&format!("{}: {:.1} MB", out.display(), size as f64 / 1e6));
 }
 
 /// The part of the film to read: poses of hours would fill the memory.

@@ -13,6 +13,9 @@ const NEEDED_S: f64 = 30.0;
 /// The trunk's frequency in wind is to be known within this share of it, either way: what ten periods
 /// are meant to give. Its interval shrinks with the root of the length of the film.
 const TRUNK_WITHIN: f64 = 0.05;
+/// What the trunk asks for is rounded up to multiples of this, s: its interval is itself an estimate, that of
+/// the next answer is another one.
+const ROUNDED_TO_S: f64 = 5.0;
 /// A longer film is not looked at as a whole, s (`dynamics.window_s`, unless it is changed).
 const LONGEST_S: f64 = 60.0;
 /// Below this share of the length that is needed a film is poor: two or three periods tell a
@@ -121,6 +124,9 @@ pub struct SwayFacts {
     /// makes surer.
     #[serde(default)]
     pub trunk_within: Option<f64>,
+    /// How much film that is by, s; `None`: the whole one.
+    #[serde(skip)]
+    pub looked_at_s: Option<f64>,
     /// The slowest mode that is surely slower than the trunk's, Hz. The trunk carries all, and what sways
     /// as a whole sways slowest, but for a stout trunk with limp branches.
     #[serde(default)]
@@ -256,15 +262,24 @@ impl CaptureFacts {
         self.needed_s() - self.filmed_s
     }
 
-    /// What is still to be filmed in wind for the trunk to be known well enough, s, as far as that is
-    /// looked at.
     fn missing_for_trunk_s(&self) -> f64 {
-        let within = self.sway.and_then(|sway| sway.trunk_within);
-        let share = within.map_or(0.0, |within| within / TRUNK_WITHIN);
-        (share * share * self.filmed_s).min(LONGEST_S) - self.filmed_s
+        self.needed_for_trunk_s() - self.filmed_s
     }
 
-    /// What had to be filmed, s.
+    /// What had to be filmed in wind for the trunk to be known well enough, s, as far as that is looked at;
+    /// 0 where it is. It stays as it is until the next answer of the sway.
+    fn needed_for_trunk_s(&self) -> f64 {
+        let within = self.sway.and_then(|sway| sway.trunk_within);
+        let share = within.map_or(0.0, |within| within / TRUNK_WITHIN);
+        if share <= 1.0 {
+            return 0.0;
+        }
+        let looked_at_s = self.sway.and_then(|sway| sway.looked_at_s);
+        let needed_s = share * share * looked_at_s.unwrap_or(self.filmed_s);
+        (ROUNDED_TO_S * (needed_s / ROUNDED_TO_S).ceil()).min(LONGEST_S)
+    }
+
+    /// What had to be filmed for branches.
     fn needed_s(&self) -> f64 {
         let known_hz = self.sway.and_then(|sway| sway.trunk_hz);
         known_hz.map_or(NEEDED_S, |hz| {
@@ -355,7 +370,7 @@ impl CaptureFacts {
             return None;
         }
         let grade = Grade::of(self.filmed_s, needed_s, POOR_SHARE * needed_s)?;
-        let (filmed_s, needed_s) = (self.filmed_s.round(), needed_s.ceil());
+        let (filmed_s, needed_s) = (self.filmed_s.round(), self.needed_in_all_s());
         Some(Finding {
             grade,
             reason: format!("{filmed_s:.0} of {needed_s:.0} s filmed"),
@@ -363,11 +378,14 @@ impl CaptureFacts {
         })
     }
 
-    /// What is to be filmed for branches and trunk: one number for both, in whole seconds that add up
-    /// with what is filmed.
+    /// What had to be filmed for branches and trunk: one number for both, in whole seconds.
+    fn needed_in_all_s(&self) -> f64 {
+        self.needed_s().ceil().max(self.needed_for_trunk_s())
+    }
+
+    /// What is still to be filmed, in whole seconds that add up with what is filmed.
     fn film_more(&self) -> String {
-        let for_branches_s = self.needed_s().ceil() - self.filmed_s.round();
-        let missing_s = for_branches_s.max(self.missing_for_trunk_s().round());
+        let missing_s = self.needed_in_all_s() - self.filmed_s.round();
         format!("film {:.0} s more", missing_s.max(1.0))
     }
 
@@ -376,14 +394,10 @@ impl CaptureFacts {
         if within <= TRUNK_WITHIN {
             return None;
         }
-        let missing_s = self.missing_for_trunk_s().round();
         Some(Finding {
             grade: Grade::Fair,
-            reason: format!(
-                "the trunk's frequency is known to {:.1} % only",
-                100.0 * within
-            ),
-            advice: match missing_s >= LENGTH_SLACK_S {
+            reason: format!("trunk's frequency within {:.1} % only", 100.0 * within),
+            advice: match self.missing_for_trunk_s() >= LENGTH_SLACK_S {
                 true => self.film_more(),
                 false => "pull the tree and release it".into(),
             },
@@ -399,7 +413,10 @@ impl CaptureFacts {
                 "a part sways at {slower_hz:.2} Hz, slower than the trunk at {trunk_hz:.2} Hz, which is rare: one of \
                  the two may be wrong"
             ),
-            advice: "pull the tree and release it".into(),
+            advice: match sway.trunk_within {
+                Some(_) => "pull the tree and release it".into(),
+                None => "pull it at another place, and film that".into(),
+            },
         })
     }
 

@@ -12,7 +12,9 @@ pub enum OutlineError {
         name: String,
         source: std::io::Error,
     },
-    #[error("outline {name}: {what}; draw it on a frame of this clip, or leave --outline out")]
+    #[error(
+        "outline {name}: {what}; give a polygon (JSON) or a mask (PNG) drawn on a frame of this clip, or leave --outline out"
+    )]
     BadFile { name: String, what: String },
     #[error(
         "outline {name} is for {found}, the picture is {wanted}; draw it on a frame of this clip"

@@ -5,7 +5,7 @@ use super::error::OutlineError;
 use super::region;
 use crate::model::{Outline, Size, brightness};
 use crate::signal::median;
-use image::RgbaImage;
+use image::{ImageError, RgbaImage};
 use std::path::Path;
 
 /// Share of undecided pixels above which a picture holds scribbles: a mask has them at its soft
@@ -69,7 +69,12 @@ pub fn read(path: &Path, size: Size) -> Result<Given, OutlineError> {
     let name = path.display().to_string();
     let picture = image::open(path)
         .map_err(|e| {
-            let what = format!("it is neither a JSON polygon nor a picture ({e})");
+            let what = match e {
+                ImageError::Unsupported(_) => {
+                    "it is neither a JSON polygon nor a picture".to_owned()
+                }
+                e => format!("it is no picture that can be read ({e})"),
+            };
             OutlineError::bad_file(&name, what)
         })?
         .into_rgba8();

@@ -19,7 +19,8 @@ const FOOT_GUESSED: &str = "the foot of the trunk is a guess, below the middle o
                             trunk (--trunk FILE)";
 /// That of one whose wood was not looked for to the end.
 const TOO_SHORT_FOR_WOOD: &str = "the wood was not looked for, as the end was wanted: the tree is \
-                                  that of the motion alone";
+                                  that of the motion alone, and its copies in depth are made up; \
+                                  film some seconds longer";
 
 /// The warning where the camera's own motion is not known.
 const CAMERA_UNCLEAR: &str = "nothing around the outline shows how the camera moves: what it shakes \
@@ -63,7 +64,7 @@ impl Announced {
         if tree.refinements > 0 {
             let kept = tree.kept;
             shared.tell(format!(
-                "the tree was refined from {:.0} s on: {kept} of {nodes} nodes are those of before",
+                "the tree was refined at {:.0} s: {kept} of {nodes} nodes keep their numbers",
                 tree.time_s
             ));
             tracing::info!(

@@ -20,7 +20,7 @@ use crate::document::{
 use crate::dynamics::Take;
 use crate::files::OutputFolder;
 use crate::model::{
-    AtRest, Background, CameraState, Gap, GapCause, Origin, Outline, Picture, Pose, Rgb, Skeleton,
+    AtRest, Background, CameraState, GapCause, Origin, Outline, Picture, Pose, Rgb, Skeleton,
     TagScale, Tentative, Timing, TrackLog, TrackSet, Unidentified, Verdict, WoodSeen,
 };
 use crate::recording::TrackFileReader;
@@ -339,7 +339,7 @@ fn warn_of_unanalysed(job: &CaptureJob, tree: &Model) {
         let of = tree.skeleton.measured_branches().count();
         job.shared.warn(format!(
             "the sway of {missing} of {of} branches was not looked at, as the end was wanted: \
-             `arborcam analyze DIR` tells it"
+             `arborcam analyze DIR --update` adds it"
         ));
     }
 }

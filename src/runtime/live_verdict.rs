@@ -83,7 +83,11 @@ impl LiveVerdict {
             let branch = sway.branches.get(&node.name);
             sways.push(branch.map_or(Err(Unidentified::NotMeasured), |branch| branch.swaying));
         }
-        SwayFacts::of(&model.skeleton, &sways, sway.modes.iter().map(Into::into))
+        let facts = SwayFacts::of(&model.skeleton, &sways, sway.modes.iter().map(Into::into))?;
+        Some(SwayFacts {
+            looked_at_s: Some(sway.span_s),
+            ..facts
+        })
     }
 
     /// `None` in the first second.
