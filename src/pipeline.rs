@@ -54,11 +54,11 @@ pub use film_log::{FilmLog, KeptFrame};
 pub use front::FrontEnd;
 pub use grown::stand_grown;
 #[cfg(feature = "opencv")]
-pub use photograph::{DrawnPart, PhotoError, PhotoOptions, TreeInPhoto, see_tree};
+pub use photograph::{Both, DrawnPart, InTurn, PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 pub use pose_tracker::{PoseReplay, PoseTracker, Targets};
 pub use refiner::SolveJob;
 pub use reshape::{MOST_RESHAPED, cut_to, grown_terms, reshape};
-pub use scanned::{ScaledTree, stand_scanned};
+pub use scanned::{ScaledTree, as_scanned, stand_scanned};
 #[cfg(feature = "opencv")]
 pub use seeds::seeds as leaf_seeds;
 pub use seen::Seen;

@@ -7,6 +7,7 @@ use arborcam::config::TraceBy;
 use arborcam::import::{Sketch, read_strokes};
 use arborcam::model::TreeStrokes;
 use arborcam::pipeline::{PhotoOptions, see_tree};
+use arborcam::runtime::AtOnce;
 use arborcam::source::Photograph;
 use arborcam::wood::LeafHint;
 use std::path::Path;
@@ -36,7 +37,16 @@ fn line(folder: &Path) -> String {
         leaves: LeafHint::Unknown,
         trace_by: TraceBy::Paths,
     };
-    let look = || see_tree(&photo.picture, &drawn, options, &CancelToken::new()).expect("a tree");
+    let look = || {
+        see_tree(
+            &photo.picture,
+            &drawn,
+            options,
+            &AtOnce,
+            &CancelToken::new(),
+        )
+        .expect("a tree")
+    };
     let in_leaf = look().seen.in_leaf;
     let ms = median((0..REPEATS).map(|_| timed_ms(look).0).collect());
     let state = if in_leaf { "in leaf" } else { "bare" };

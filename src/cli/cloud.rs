@@ -2,6 +2,7 @@
 
 mod pairs;
 mod plot;
+mod table;
 
 use super::command_error::CommandError;
 use super::common::parse_within;
@@ -26,6 +27,7 @@ use pairs::{Pairs, read_pairs};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 /// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
 /// that.
@@ -133,6 +135,9 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         config.wood.seed = args.seed;
     })?;
     let film = args.film.as_deref().map(Document::tree).transpose()?;
+    if let Some(table) = table::read(&args.file)? {
+        return table::write(args, &table, film.as_ref(), config, &stop);
+    }
     let CloudRead {
         cloud,
         units_in_file,
@@ -168,24 +173,11 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     }
     let holds_ground = found.figures.ground > 0;
     let tree = args.chosen(found, number)?;
-    let mut drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
+    let drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
     let is_stopped = stop.while_writing();
     let branches = drawn.skeleton.botanical_branches().all.len();
-    let pieces = drawn.skeleton.measured_branches().count();
     match &film {
-        Some(capture) => {
-            let film = args.laid_on(capture, &tree, &scan, &drawn)?;
-            let swaying = film.branches();
-            if let Some(warning) = film.lean_warning() {
-                eprint_line(&format!("arborcam: warning: {warning}"));
-                drawn.note.warnings.push(warning);
-            }
-            drawn.write_with_film(&args.out, &film, is_stopped)?;
-            eprint_line(&format!(
-                "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
-                lies_on(&film.fit)
-            ));
-        }
+        Some(capture) => args.write_with_film(capture, &tree, &scan, drawn, is_stopped)?,
         None => drawn.write(&args.out, is_stopped)?,
     }
     if !holds_ground {
@@ -284,6 +276,33 @@ impl CloudArgs {
             "--film: {count} trees stand in {}; say with --tree which of them was filmed",
             self.file.display()
         )))
+    }
+
+    /// Writes the tree with the frequencies of a film, and says how well that lies on it.
+    ///
+    /// # Errors
+    /// It does not lie on the scan, or the tree cannot be written.
+    fn write_with_film(
+        &self,
+        capture: &Document,
+        tree: &CloudTree,
+        scan: &Scan,
+        mut drawn: DrawnTree,
+        is_stopped: &AtomicBool,
+    ) -> Result<(), CommandError> {
+        let film = self.laid_on(capture, tree, scan, &drawn)?;
+        let swaying = film.branches();
+        let pieces = drawn.skeleton.measured_branches().count();
+        for warning in film.warnings() {
+            eprint_line(&format!("arborcam: warning: {warning}"));
+            drawn.note.warnings.push(warning);
+        }
+        drawn.write_with_film(&self.out, &film, is_stopped)?;
+        eprint_line(&format!(
+            "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
+            lies_on(&film.fit)
+        ));
+        Ok(())
     }
 
     /// The film on the scan.

@@ -17,6 +17,7 @@ use crate::export::gltf::NamedBytes;
 use crate::files::{refuse_taken, write_folder};
 use crate::grow::SubtreeKind;
 use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
+use crate::runtime::AtOnce;
 use crate::views::{
     Attracting, ForestPlan, PhotoDepth, PhotoExample, PhotoGrowth, PhotoParts, PhotoTree,
     PhotoTreeError, ReadyDocument, StandingPlaces, photo_defaults, photo_forest,
@@ -265,6 +266,7 @@ fn seen(
             &shown.picture.rgb,
             &own.strokes,
             options,
+            &AtOnce,
             &CancelToken::new(),
         );
         seen.push(tree.map_err(|e| failure(shown, own, e.into()))?);

@@ -2,6 +2,7 @@
 
 use super::command_error::{CommandError, FAILED};
 use super::output::eprint_line;
+use crate::runtime::in_background;
 use crate::tui;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::flag::{register, register_conditional_shutdown};
@@ -49,10 +50,10 @@ pub fn stop_on_signals(
         register(signal, stop.clone()).map_err(CommandError::failed)?;
     }
     let signals = Signals::new([SIGINT, SIGTERM]).map_err(CommandError::failed)?;
-    thread::Builder::new()
-        .name("signals".into())
-        .spawn(move || end_at_second(signals, &is_ending, unfinished.as_deref()))
-        .map_err(CommandError::failed)?;
+    in_background("signals", move || {
+        end_at_second(signals, &is_ending, unfinished.as_deref())
+    })
+    .map_err(CommandError::failed)?;
     Ok(stop)
 }
 

@@ -9,7 +9,7 @@
 
 use super::lines::{LinePlace, WoodPiece, places_seen, thickest};
 use crate::signal::{CommonMotion, Pair};
-use nalgebra::{Point2, Point3, Similarity2, UnitComplex, Vector2};
+use nalgebra::{Point2, Point3, Similarity2, UnitComplex, Vector2, distance_squared};
 use std::f64::consts::TAU;
 
 /// Starts round the tree, and the steps about the best of them, radians.
@@ -73,6 +73,16 @@ impl Registration {
     pub fn depth_px(&self, at: &Point3<f64>) -> f64 {
         let (sin, cos) = self.turn.sin_cos();
         self.to_picture.scaling() * (at.y * cos - at.x * sin)
+    }
+
+    /// Whether places that are the same in film and scan come to lie together; `height_px` is that of the
+    /// tree in the film. Places of the film have y up.
+    pub fn agrees_with(&self, pairs: &[PlacePair], height_px: f64) -> bool {
+        let squares = pairs
+            .iter()
+            .map(|p| distance_squared(&self.project(&p.scan), &p.film_px));
+        let mean = squares.sum::<f64>() / pairs.len().max(1) as f64;
+        mean.sqrt() <= LARGEST_PAIR_MISS * height_px
     }
 
     /// Whether it holds: it misses by little, and no other side of the tree fits nearly as well.

@@ -41,7 +41,7 @@ pub use flat_tree::{FlatTree, cover_px};
 pub use gltf_skeleton::MovingModel;
 pub use join::joined;
 pub use lens_profile::read_lens_profile;
-pub use model_file::read_model;
+pub use model_file::{is_wood_table, read_model};
 pub use model_tree::{ModelNode, ModelTree, Wood};
 pub use sketch::{Sketch, Stroke, read_sketch, read_strokes};
 pub use standing::StandingModel;

@@ -43,3 +43,13 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
         step_s: 0.0,
     })
 }
+
+/// Whether the text at the begin of a file is that of a table of cylinders or of a treefile, and not of
+/// points.
+pub fn is_wood_table(begin: &str) -> bool {
+    let mut lines = begin.lines().filter(|line| !line.starts_with('#'));
+    let header = lines.find(|line| !line.trim().is_empty()).unwrap_or("");
+    header
+        .split(',')
+        .any(|name| ["parentID", "parent_ID", "parent_id"].contains(&name.trim()))
+}

@@ -2,7 +2,7 @@
 
 use super::error::ImportError;
 use super::sketch::refuse_more;
-use crate::model::Sway;
+use crate::model::{Sway, Swaying, Unidentified};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -54,6 +54,19 @@ pub(super) fn from_z_up([x, y, z]: [f64; 3]) -> Point3<f64> {
 }
 
 impl ModelTree {
+    /// How the wood that ends in each node sways, as far as the file says: as the last of the pieces of its
+    /// branch of which that is known.
+    pub fn sways(&self) -> Vec<Swaying> {
+        let children = self.children();
+        let mut known: Vec<Swaying> = Vec::with_capacity(self.nodes.len());
+        for node in &self.nodes {
+            let own = node.wood.sway.ok_or(Unidentified::NotMeasured);
+            let below = node.parent.filter(|p| children[*p].len() == 1);
+            known.push(own.or_else(|e| below.map_or(Err(e), |p| known[p])));
+        }
+        known
+    }
+
     /// The tree of joined places, y up. Places that are the same are one. Places that are joined to
     /// nothing do not count.
     ///

@@ -7,7 +7,7 @@ use super::error::ImportError;
 use super::flat_tree::flat_node;
 use super::model_tree::ModelTree;
 use super::sketch::refuse_more;
-use crate::model::{NOT_FILMED_PX, Node, NodeId, Pose, Skeleton, Sway, Swaying, Unidentified};
+use crate::model::{NOT_FILMED_PX, Node, NodeId, Pose, Skeleton, Swaying};
 use nalgebra::{Point2, Point3, UnitQuaternion};
 
 /// A tree is not so many times as wide as it is high.
@@ -69,16 +69,8 @@ impl StandingModel {
     /// How the branch that ends in each node of the skeleton sways, as far as `model` says: as the last
     /// of its pieces of which that is known.
     pub fn sway(&self, model: &ModelTree) -> Vec<Swaying> {
-        let children = model.children();
-        let mut known: Vec<Option<Sway>> = Vec::with_capacity(model.nodes.len());
-        for node in &model.nodes {
-            let below = node.parent.filter(|p| children[*p].len() == 1);
-            known.push(node.wood.sway.or(below.and_then(|p| known[p])));
-        }
-        let of_model = self.of_model.iter();
-        of_model
-            .map(|i| known[*i].ok_or(Unidentified::NotMeasured))
-            .collect()
+        let known = model.sways();
+        self.of_model.iter().map(|i| known[*i]).collect()
     }
 }
 

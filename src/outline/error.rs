@@ -13,7 +13,7 @@ pub enum OutlineError {
         source: std::io::Error,
     },
     #[error(
-        "outline {name}: {what}; give a polygon (JSON) or a mask (PNG) drawn on a frame of this clip, or leave --outline out"
+        "outline {name}: {what}; draw it on a frame of this clip, as a polygon (JSON) or a mask (PNG), or leave --outline out"
     )]
     BadFile { name: String, what: String },
     #[error(

@@ -12,8 +12,6 @@ use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
 use crate::wood::{self, LeafColour, LeafHint, LeavesSeen, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
-use std::panic::resume_unwind;
-use std::thread;
 
 /// Gaps between leaves up to this share of the photograph's width are closed; up to the second where one
 /// piece then has nearly all.
@@ -138,6 +136,22 @@ impl PhotoError {
     }
 }
 
+/// How two pieces of work are done that do not wait for each other.
+pub trait Both {
+    /// Does them, one after the other or at the same time.
+    fn both<A: Send, B>(&self, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B);
+}
+
+/// One after the other.
+#[derive(Clone, Copy, Debug)]
+pub struct InTurn;
+
+impl Both for InTurn {
+    fn both<A: Send, B>(&self, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
+        (first(), second())
+    }
+}
+
 /// Finds leaves, wood and visible branches of the tree on which `drawn` lies, px of `picture`. Where
 /// crown or trunk are not drawn, they are those of what stands in the middle of the picture.
 ///
@@ -147,6 +161,7 @@ pub fn see_tree(
     picture: &Rgb,
     drawn: &TreeStrokes,
     options: PhotoOptions,
+    both: &impl Both,
     cancel: &CancelToken,
 ) -> Result<TreeInPhoto, PhotoError> {
     let looked = Looked {
@@ -168,7 +183,7 @@ pub fn see_tree(
         false => Some(crown(&drawn.crown_px, picture.size)?),
     };
     match crown {
-        Some(crown) if !strokes.is_empty() => looked.along_drawn(Attempt { crown, strokes }),
+        Some(crown) if !strokes.is_empty() => looked.along_drawn(Attempt { crown, strokes }, both),
         crown => looked.best(&Half { crown, strokes }),
     }
 }
@@ -227,13 +242,11 @@ impl Looked<'_> {
 
     /// The tree along drawn strokes. The trunk settles from its stroke, while the leaves are found in the whole
     /// picture.
-    fn along_drawn(&self, drawn: Attempt) -> Result<TreeInPhoto, PhotoError> {
-        let (leaves, trunk) = thread::scope(|scope| {
-            let leaves = scope.spawn(|| LeavesSeen::of(self.view(&drawn), self.cancel));
-            let trunk = self.trunk_along(&drawn);
-            let leaves = leaves.join().unwrap_or_else(|panic| resume_unwind(panic));
-            (leaves, trunk)
-        });
+    fn along_drawn(&self, drawn: Attempt, both: &impl Both) -> Result<TreeInPhoto, PhotoError> {
+        let (leaves, trunk) = both.both(
+            || LeavesSeen::of(self.view(&drawn), self.cancel),
+            || self.trunk_along(&drawn),
+        );
         let leaves = leaves.map_err(|e| not_seen(e, self.drawn))?;
         match trunk? {
             Some(trunk) => {
@@ -522,7 +535,8 @@ mod tests {
             leaves: LeafHint::Unknown,
             trace_by: TraceBy::Paths,
         };
-        let found = see_tree(&picture, &drawn, options, &CancelToken::new()).expect("a tree");
+        let cancel = CancelToken::new();
+        let found = see_tree(&picture, &drawn, options, &InTurn, &cancel).expect("a tree");
         assert!(found.found.is_some() && !found.seen.in_leaf);
         let all = is_wood.iter().filter(|is_wood| **is_wood).count();
         let both = is_wood.iter().zip(&found.seen.tree);

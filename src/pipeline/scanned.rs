@@ -1,6 +1,7 @@
 //! The tree of a point cloud as a skeleton.
 
-use crate::cloud::CloudTree;
+use crate::cloud::{CloudFigures, CloudNode, CloudTree};
+use crate::import::ModelTree;
 use crate::model::{NOT_FILMED_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 use nalgebra::Point3;
 
@@ -49,6 +50,31 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
     }
 }
 
+/// A modelled tree as one of a scan, node by node; a unit of its file is so many metres. `None` where a
+/// radius is not known, or it has no height.
+pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Option<CloudTree> {
+    let mut nodes = Vec::with_capacity(model.nodes.len());
+    for node in &model.nodes {
+        let at = node.position * metres_per_unit;
+        nodes.push(CloudNode {
+            parent: node.parent,
+            position: Point3::new(at.x, -at.z, at.y),
+            radius: node.wood.radius * metres_per_unit,
+            is_measured: false,
+        });
+    }
+    let foot_m = nodes.first()?.position.z;
+    let top_m = nodes.iter().map(|n| n.position.z).fold(foot_m, f64::max);
+    let is_thick = nodes.iter().skip(1).all(|n| n.radius > 0.0);
+    // The foot is as thick as what stands on it.
+    nodes[0].radius = nodes.get(1).map_or(0.0, |n| n.radius.max(nodes[0].radius));
+    let figures = CloudFigures {
+        height_m: top_m - foot_m,
+        ..CloudFigures::default()
+    };
+    (is_thick && figures.height_m > 0.0).then_some(CloudTree { nodes, figures })
+}
+
 /// For each node the one in which its branch ends: the next fork or tip. The foot is its own.
 fn movers(tree: &CloudTree, children: &[usize]) -> Vec<usize> {
     let mut movers: Vec<usize> = (0..tree.nodes.len()).collect();
@@ -63,7 +89,6 @@ fn movers(tree: &CloudTree, children: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{CloudFigures, CloudNode};
 
     /// A stem with a bend that forks; one of the two has a bend.
     #[test]

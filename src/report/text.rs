@@ -38,7 +38,7 @@ fn one(study: &Study, columns: Option<usize>) -> String {
         top += &format!("{}\n", origin.join(", "));
     }
     if let Some(verdict) = &study.verdict {
-        top += &format!("verdict of the whole capture: {}\n", verdict.line());
+        top += &format!("{} (of the whole capture)\n", verdict.labelled_line());
     }
     top += &format!("{}\n", words::excitation(study));
     let (answers, all) = (study.answers(), words::number_of(branches.len(), "branch"));

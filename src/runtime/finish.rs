@@ -4,6 +4,7 @@ use super::announce::little_motion;
 use super::capture_tables::{CaptureTables, Done};
 use super::judge::{FilmLength, judge};
 use super::meter::Histogram;
+use super::parallel::beside;
 use super::shaking::ShakeMeter;
 use super::shared::{Failure, Shared};
 use crate::config::Config;
@@ -342,26 +343,6 @@ fn warn_of_unanalysed(job: &CaptureJob, tree: &Model) {
              `arborcam analyze DIR --update` adds it"
         ));
     }
-}
-
-/// Does both at the same time, the first on a thread of this name, or one after the other where
-/// there is none to be had.
-fn beside<A: Send, B>(
-    name: &str,
-    first: impl Fn() -> A + Sync,
-    second: impl FnOnce() -> B,
-) -> (A, B) {
-    std::thread::scope(|scope| {
-        let thread = std::thread::Builder::new()
-            .name(name.into())
-            .spawn_scoped(scope, &first);
-        let b = second();
-        match thread.map(std::thread::ScopedJoinHandle::join) {
-            Ok(Ok(a)) => (a, b),
-            Ok(Err(panic)) => std::panic::resume_unwind(panic),
-            Err(_) => (first(), b),
-        }
-    })
 }
 
 /// Tables without rows and no model: a reader finds every table, and no tree that was never seen.

@@ -54,7 +54,7 @@ pub use asked::{Answer, Asked};
 pub use finish::Written;
 pub use job::{Job, Summary};
 pub use one_frame::{FrameError, one_frame};
-pub use parallel::{Undone, in_parallel};
+pub use parallel::{AtOnce, Undone, in_background, in_parallel};
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};

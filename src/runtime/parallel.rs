@@ -1,5 +1,8 @@
 //! Independent pieces of work on several threads.
 
+use crate::pipeline::Both;
+use std::io;
+use std::panic::resume_unwind;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
@@ -46,6 +49,45 @@ pub fn in_parallel<E: Send>(
         // A thread that panicked ends the scope with its panic, before this.
         _ => Err(Undone::Stopped),
     }
+}
+
+/// Does both at the same time, the first on a thread of this name, or one after the other where
+/// there is none to be had.
+pub fn beside<A: Send, B>(
+    name: &str,
+    first: impl Fn() -> A + Sync,
+    second: impl FnOnce() -> B,
+) -> (A, B) {
+    thread::scope(|scope| {
+        let thread = thread::Builder::new()
+            .name(name.into())
+            .spawn_scoped(scope, &first);
+        let b = second();
+        match thread.map(thread::ScopedJoinHandle::join) {
+            Ok(Ok(a)) => (a, b),
+            Ok(Err(panic)) => resume_unwind(panic),
+            Err(_) => (first(), b),
+        }
+    })
+}
+
+/// Two pieces of work at the same time.
+#[derive(Clone, Copy, Debug)]
+pub struct AtOnce;
+
+impl Both for AtOnce {
+    fn both<A: Send, B>(&self, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
+        beside("beside", first, second)
+    }
+}
+
+/// Does `work` on a thread of this name, which nobody waits for.
+///
+/// # Errors
+/// There is no thread to be had.
+pub fn in_background(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
+    let thread = thread::Builder::new().name(name.into());
+    thread.spawn(work).map(drop)
 }
 
 /// The pieces, shared by all threads.

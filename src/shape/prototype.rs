@@ -114,7 +114,7 @@ impl Prototype {
             .iter()
             .map(|p| Point2::from(*p))
             .collect();
-        let trunk = trunk(flat, settings.leader, &leader_px);
+        let trunk = trunk(flat, tracks, settings.leader, &leader_px);
         let skeleton = copy_to_planes(flat, tracks, &trunk, outline, &envelope, settings.planes);
         Self {
             skeleton,

@@ -12,9 +12,16 @@ const REACH: f64 = 0.06;
 const STRAIGHT: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Which nodes of the flat skeleton are trunk: the foot, the trunk's top, and with a leader the
-/// chain that goes on from there along it. `leader_px` is the line that was drawn, from the foot
-/// up, px; it counts only with [`Leader::Drawn`].
-pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<bool> {
+/// chain that goes on from there along it; where none leads on, the chain of those that carry more than half
+/// of the tree's points, as a stem does that only twigs leave. `carried` is how many points each node
+/// carries, `leader_px` the line that was drawn, from the foot up, px; it counts only with
+/// [`Leader::Drawn`].
+pub fn trunk(
+    flat: &[Node2d],
+    carried: &[u32],
+    leader: Leader,
+    leader_px: &[Point2<f64>],
+) -> Vec<bool> {
     let mut trunk: Vec<bool> = flat.iter().map(|n| n.level < 2).collect();
     let Some(foot) = flat.first().map(|n| n.position_px) else {
         return trunk;
@@ -25,11 +32,15 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<
         .filter(|v| v.is_finite())
         .fold(foot.y, f64::min);
     let reach = REACH * (foot.y - top_v);
+    let all = carried.first().copied().unwrap_or_default();
     let mut at = flat.iter().position(|n| n.level == 1);
     while let Some(from) = at {
         let children =
             (0..flat.len()).filter(|&i| flat[i].parent == Some(from) && flat[i].level >= 2);
-        at = match leader {
+        let stem = children
+            .clone()
+            .find(|&i| carried.get(i).is_some_and(|own| 2 * own > all));
+        let led = match leader {
             Leader::None => None,
             Leader::Drawn => nearest(
                 children.map(|i| (i, distance_to_line(flat[i].position_px, leader_px))),
@@ -44,6 +55,7 @@ pub fn trunk(flat: &[Node2d], leader: Leader, leader_px: &[Point2<f64>]) -> Vec<
                 )
             }
         };
+        at = led.or(stem);
         if let Some(i) = at {
             trunk[i] = true;
         }

@@ -79,7 +79,10 @@ impl DrawnTree {
     }
 
     /// The same with the sway of its nodes, by node index.
-    pub(super) fn write_swaying(
+    ///
+    /// # Errors
+    /// As there.
+    pub fn write_swaying(
         self,
         dir: &Path,
         sway: &[Swaying],

@@ -29,7 +29,11 @@ pub fn register_film(
         scan: p.scan,
     };
     let pairs: Vec<PlacePair> = pairs.iter().map(upright).collect();
-    by_pairs(&pairs, height_px).map(FilmFit::by_pairs)
+    let found = by_pairs(&pairs, height_px)?;
+    // Three pairs are six numbers for five unknowns; lines say more, and how sure it is.
+    let finer = FilmFit::by_lines(found, &pieces, &scan_wood(tree), upright_in_wind(film));
+    let finer = finer.filter(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));
+    Some(finer.unwrap_or_else(|| FilmFit::by_pairs(found)))
 }
 
 /// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree

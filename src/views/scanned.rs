@@ -28,8 +28,20 @@ impl FilmOnScan {
         self.sway.iter().filter(|s| s.is_ok()).count()
     }
 
+    /// What the user should know before trusting it.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        self.lean_warning().into_iter().chain(self.unsure_warning())
+    }
+
+    /// That of a registration which lines did not make surer.
+    fn unsure_warning(&self) -> Option<String> {
+        let unsure = "the film lies on the scan by its pairs alone, and nothing says how surely: the lines of the two do \
+                      not agree with them; give five pairs or more, all over the tree";
+        self.fit.off_hi.is_none().then(|| unsure.to_owned())
+    }
+
     /// The warning where the places of the tree at rest are less sure than where it was filmed.
-    pub fn lean_warning(&self) -> Option<String> {
+    fn lean_warning(&self) -> Option<String> {
         let lean = self.fit.lean.filter(|_| self.fit.is_rest_unsure())?;
         let advice = match self.has_tag {
             true => "",

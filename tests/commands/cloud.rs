@@ -173,6 +173,59 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
     }
 }
 
+/// A table of another tool is a tree as it stands: its lengths, volumes and frequencies come out again.
+#[test]
+fn a_table_of_cylinders_is_a_tree_as_that_of_a_scan() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let table = dir.path().join("oak.csv");
+    let rows = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius,frequency_hz,damping_ratio\n\
+                1,0,7,3,1,7,3,3,0.2,,\n2,1,7,3,3,7.5,3,5,0.1,0.8,0.05\n\
+                3,1,7,3,3,6,3.5,4,0.08,,\n4,3,6,3.5,4,5.5,4,5.5,0.05,1.4,0.04\n";
+    fs::write(&table, rows).expect("table");
+    let [out, again] = ["oak", "again.csv"].map(|name| dir.path().join(name));
+    let said = done(&["cloud", table.to_str().expect("name")], &out);
+    assert!(
+        said.contains("a tree of 2 branches, 4.50 m high") && said.contains("taken as metres"),
+        "{said}"
+    );
+    let tree = Document::read(&out, 1.0).expect("document");
+    let hz: Vec<f64> = tree
+        .sway
+        .iter()
+        .flatten()
+        .map(|s| s.frequency_hz.value)
+        .collect();
+    assert_eq!(hz, [0.8, 1.4]);
+    let shown = out.to_str().expect("name");
+    let said = done(&["export", shown, "--format", "qsm"], &again);
+    // A limb of 1.5 and 1.658 m with radii of 8 and 5 cm, a trunk of 2 and 2.062 m with 20 and 10 cm.
+    for (order, length, volume) in [(0, 4.06, 0.31611), (1, 3.16, 0.04318)] {
+        let begin = format!("order {order}: 1 branches, length ");
+        let line = said
+            .lines()
+            .find_map(|line| line.strip_prefix(&begin))
+            .expect("an order");
+        let numbers: Vec<f64> = line
+            .split(' ')
+            .filter_map(|word| word.parse().ok())
+            .collect();
+        assert!((numbers[0] / length - 1.0).abs() < 0.01, "{line}");
+        assert!((numbers[1] / volume - 1.0).abs() < 0.05, "{line}");
+    }
+    let bare = dir.path().join("bare.csv");
+    let without = rows
+        .lines()
+        .map(|row| row.split(',').take(8).collect::<Vec<_>>().join(","));
+    fs::write(&bare, without.collect::<Vec<_>>().join("\n")).expect("table");
+    let refused = arborcam(
+        &["cloud", bare.to_str().expect("name")],
+        &dir.path().join("none"),
+    );
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert_eq!(refused.status.code(), Some(FAILED), "{said}");
+    assert!(said.contains("have no radius"), "{said}");
+}
+
 #[test]
 fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
     let dir = tempfile::tempdir().expect("tempdir");

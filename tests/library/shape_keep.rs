@@ -110,7 +110,7 @@ fn found_later(old: &Flat, seed: u64) -> (Flat, Vec<Option<Twin>>) {
             measured.push(None);
         }
     }
-    let tracks = vec![3; nodes.len()];
+    let tracks = trees::carried(&nodes);
     (
         Flat {
             name: "found later",
@@ -229,7 +229,7 @@ fn no_branch_is_held_where_it_would_turn_back() {
     };
     let with = |nodes: Vec<Node2d>| Flat {
         name: "fork",
-        tracks: vec![3; nodes.len()],
+        tracks: trees::carried(&nodes),
         nodes,
         outline: Flat::generated(3).outline,
     };

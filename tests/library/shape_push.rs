@@ -1,7 +1,7 @@
 //! The push of the skeleton into space: fills its envelope, keeps its angles, is not a mirror
 //! image; and odd input.
 
-use crate::trees::Flat;
+use crate::trees::{self, Flat};
 use arborcam::config::{self, EnvelopeKind, Leader};
 use arborcam::model::{NodeId, Outline, Size, Skeleton};
 use arborcam::shape::{self, Prototype, PushFigures, is_trunk};
@@ -18,8 +18,8 @@ fn the_tree_is_as_full_as_by_the_envelope_alone_and_as_plausible_as_by_the_angle
         name: "another",
         ..Flat::generated_by(levels, seed, wild)
     });
-    let trees = Flat::all().into_iter().map(Flat::in_drawn_outline);
-    for tree in trees.chain(others) {
+    let clips = Flat::all().into_iter().map(Flat::in_drawn_outline);
+    for tree in clips.chain(others) {
         let settings = config::Shape::default();
         let built = build(&tree, &settings);
         let figures = PushFigures::of(&built, &tree.nodes, &tree.tracks, &tree.outline, &settings);
@@ -120,7 +120,7 @@ fn conifer() -> Flat {
     let outline = arborcam::outline::from_polygon(&border, Size::new(200, 240)).expect("outline");
     Flat {
         name: "conifer",
-        tracks: vec![2; nodes.len()],
+        tracks: trees::carried(&nodes),
         nodes,
         outline,
     }

@@ -1,5 +1,6 @@
 //! From tracks to tree and pose, on motion and shapes that are known.
 
+use crate::trees;
 use arborcam::config;
 use arborcam::hierarchy;
 use arborcam::model::TrackTable;
@@ -166,7 +167,7 @@ fn the_skeleton_is_folded_by_two_fifths_and_stands_on_the_foot() {
 }
 
 fn built() -> Skeleton {
-    let tracks = vec![2; 8];
+    let tracks = trees::carried(&flat());
     let mut tree = shape::build(&flat(), &tracks, &outline(), &config::Shape::default());
     shape::thicken(&mut tree, 5.0, &|_, _| true, &config::Wood::default(), 1);
     tree
@@ -235,15 +236,29 @@ fn attractors_lie_on_the_surface() {
     }
 }
 
+/// A stem that only twigs leave is the trunk as far as it carries more than half of all points.
+#[test]
+fn the_trunk_goes_on_in_what_carries_most() {
+    let trunk_of = |carried: [u32; 8]| shape::trunk(&flat(), &carried, config::Leader::None, &[]);
+    let forked = trunk_of([16, 16, 8, 8, 4, 4, 4, 4]);
+    assert_eq!(forked.iter().filter(|is| **is).count(), 2, "{forked:?}");
+    let stem = trunk_of([16, 16, 14, 2, 9, 5, 1, 1]);
+    let on = [true, true, true, false, true, false, false, false];
+    assert_eq!(stem, on);
+    // What no points are known of has no stem but the lowest.
+    assert_eq!(trunk_of([0; 8]), forked);
+}
+
 #[test]
 fn pushing_brings_the_tree_nearer_to_its_envelope() {
     let (settings, outline) = (config::Shape::default(), outline());
     let foot_px = Foot::of(&outline, None).position_px;
     let envelope = Envelope::of_revolution(&outline, foot_px);
-    let trunk = shape::trunk(&flat(), config::Leader::None, &[]);
+    let tracks = trees::carried(&flat());
+    let trunk = shape::trunk(&flat(), &tracks, config::Leader::None, &[]);
     let prototype = shape::copy_to_planes(
         &flat(),
-        &[2; 8],
+        &tracks,
         &trunk,
         &outline,
         &envelope,
@@ -355,7 +370,8 @@ fn leaning() -> Skeleton {
         push_options: 21,
         ..config::Shape::default()
     };
-    let mut prototype = shape::Prototype::of(&flat(), &[2; 8], &outline(), &settings);
+    let mut prototype =
+        shape::Prototype::of(&flat(), &trees::carried(&flat()), &outline(), &settings);
     let papers = Terms::Both {
         weight: 1.0,
         gain_floor: 0.0,

@@ -102,7 +102,7 @@ impl Flat {
         let outline = outline::from_polygon(&border, Size::new(640, 360)).expect("outline");
         Self {
             name: "generated",
-            tracks: vec![3; nodes.len()],
+            tracks: carried(&nodes),
             nodes,
             outline,
         }
@@ -158,4 +158,15 @@ pub fn oak_clip() -> Option<[PathBuf; 2]> {
         return None;
     };
     Some(["video.mkv", "outline.json"].map(|name| clips.join("oak_release").join(name)))
+}
+
+/// How many points each node carries, if three lie on each.
+pub fn carried(nodes: &[Node2d]) -> Vec<u32> {
+    let mut carried = vec![3; nodes.len()];
+    for (k, node) in nodes.iter().enumerate().rev() {
+        if let Some(parent) = node.parent {
+            carried[parent] += carried[k];
+        }
+    }
+    carried
 }

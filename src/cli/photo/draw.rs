@@ -9,7 +9,7 @@ use crate::cli::output::eprint_line;
 use crate::cli::signals::stop_on_signals;
 use crate::model::{Rgb, TreeStrokes};
 use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
-use crate::runtime::{Answer, Asked};
+use crate::runtime::{Answer, Asked, AtOnce};
 use crate::tui::{self, FoundTree, PhotoSession};
 use anyhow::anyhow;
 use std::io::IsTerminal;
@@ -41,7 +41,7 @@ impl PhotoSession for OnScreen<'_> {
         let options = self.options;
         // What is looked at for older strokes is given up.
         self.looking = Asked::begin("photo", move |cancel| {
-            see_tree(&picture, &strokes, options, cancel)
+            see_tree(&picture, &strokes, options, &AtOnce, cancel)
         })
         .ok();
     }
