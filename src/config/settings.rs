@@ -123,6 +123,9 @@ settings! {
     tag: Tag, SCALE {
         /// Side of its black square, m; `--tag` sets it.
         size_m: f64 [0 ("none") to 100] = 0.0;
+        /// Angle that the longer side of the picture spans, degrees. Give it if it is known, above all for a
+        /// lens that zooms: a tag off the middle gives the scale more sharply then.
+        field_of_view_deg: f64 [0 ("unknown") to 170] = 0.0;
     }
 
     /// Depth beside the colours, where the film has it. See docs/depth.md.

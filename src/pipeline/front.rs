@@ -52,7 +52,7 @@ impl FrontEnd {
             found: None,
             held: VecDeque::new(),
             markers: MarkerStage::new(&config.markers),
-            tag: TagStage::new(&config.tag),
+            tag: TagStage::new(config),
             depth: DepthReader::new(&config.depth),
             depth_gate: DepthGate::default(),
             next_id: 0,

@@ -1,8 +1,9 @@
 //! A printed tag beside the trunk: frames to a scale.
 
-use crate::config;
-use crate::model::{Frame, TagScale};
-use crate::tag::{Tag, TagSeen, find_tags, scale_of};
+use crate::config::{self, Config};
+use crate::depth;
+use crate::model::{Frame, Size, TagScale};
+use crate::tag::{Tag, TagCamera, TagSeen, find_tags, scale_of};
 
 /// The scale is fixed after so many sights, in one of so many frames; from then on the tag is looked at in
 /// one of more frames, which tells whether the camera moves.
@@ -32,6 +33,10 @@ pub enum TagNews {
 /// Looks for the tag, where there is one.
 pub(super) struct TagStage {
     settings: config::Tag,
+    /// What the film says of its colour camera, where it has depth.
+    depth: config::Depth,
+    /// The camera; `None` before the first frame.
+    camera: Option<TagCamera>,
     sights: Vec<TagSeen>,
     /// In how many frames it was seen.
     times_seen: usize,
@@ -41,9 +46,11 @@ pub(super) struct TagStage {
 }
 
 impl TagStage {
-    pub fn new(settings: &config::Tag) -> Self {
+    pub fn new(config: &Config) -> Self {
         Self {
-            settings: settings.clone(),
+            settings: config.tag.clone(),
+            depth: config.depth.clone(),
+            camera: None,
             sights: Vec::new(),
             times_seen: 0,
             frames: 0,
@@ -63,6 +70,9 @@ impl TagStage {
         self.frames += 1;
         if self.settings.size_m <= 0.0 {
             return None;
+        }
+        if self.camera.is_none() {
+            self.camera = Some(camera(&self.settings, &self.depth, frame.luma.size));
         }
         let mut in_frame = None;
         if is_turn {
@@ -119,7 +129,7 @@ impl TagStage {
 
     /// The scale as it was fixed, with what later sights say of how often it was seen and of the camera.
     fn with_all_sights(&self, fixed: TagScale) -> TagScale {
-        match scale_of(&self.sights, self.settings.size_m) {
+        match self.scale_of_sights() {
             Some(all) => TagScale {
                 frames: self.times_seen,
                 moves_px: all.moves_px,
@@ -130,11 +140,26 @@ impl TagStage {
     }
 
     fn fix(&mut self) {
-        self.scale = scale_of(&self.sights, self.settings.size_m);
+        self.scale = self.scale_of_sights();
         self.news.extend(self.scale.map(TagNews::Scale));
+    }
+
+    fn scale_of_sights(&self) -> Option<TagScale> {
+        scale_of(&self.sights, self.settings.size_m, self.camera.as_ref()?)
     }
 
     pub fn take_news(&mut self) -> Vec<TagNews> {
         std::mem::take(&mut self.news)
+    }
+}
+
+/// The camera of a film: as the user says, else as a film with depth says, else unknown.
+fn camera(tag: &config::Tag, depth: &config::Depth, size: Size) -> TagCamera {
+    if tag.field_of_view_deg > 0.0 {
+        return TagCamera::of_view(size, tag.field_of_view_deg);
+    }
+    match depth::colour_camera(depth, size) {
+        Some(model) => TagCamera::known(model),
+        None => TagCamera::unknown(size),
     }
 }
