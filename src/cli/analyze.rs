@@ -189,6 +189,9 @@ fn analyse_capture(
         notes.add("warning", warning.clone());
     }
     let marked = marked_tree(args, document, &config)?;
+    if let Some(unsure) = marked.as_ref().and_then(unsure_parents) {
+        notes.add("note", unsure);
+    }
     let camera = Optics::of(args, document)?;
     let filmed = film(args, document, marked.as_ref(), &config, &mut notes)?;
     let take = Take::of(camera.film(&filmed));
@@ -338,6 +341,19 @@ fn marked_tree(
     let longest_s = longest_s(args, config);
     let marked = document.marked_tree(args.marker_parents(), longest_s, args.within_s())?;
     Ok(Some(marked))
+}
+
+/// What is to be said of markers whose parents follow from the motion, but not for certain.
+fn unsure_parents(marked: &MarkedTree) -> Option<String> {
+    let (whose, which) = match &marked.unsure[..] {
+        [] => return None,
+        [one] => ("the parent of marker", one.clone()),
+        several => ("the parents of markers", several.join(", ")),
+    };
+    Some(format!(
+        "{whose} {which} cannot be told for certain from place and motion; see what carries them, and give parents \
+         with --markers=FILE"
+    ))
 }
 
 /// Calls the branches as the markers are called in which they end.

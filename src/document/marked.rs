@@ -2,6 +2,7 @@
 //! parent (Hu et al. sect. 5.3).
 
 use super::error::DocumentError;
+use super::marker_parents::{Placed, carried};
 use super::nodes::NodesRead;
 use super::note::ModelNote;
 use super::tracks::{PointsRead, read_points};
@@ -13,7 +14,7 @@ use crate::model::{
     Foot, JointPose, Node, NodeId, NodeKind, NodeName, Pose, Skeleton, TrackId, Unidentified,
 };
 use crate::signal::statistics::median_vector;
-use nalgebra::{Point2, Point3, UnitQuaternion, Vector3, distance};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -27,6 +28,8 @@ pub struct MarkedTree {
     pub names: BTreeMap<NodeName, String>,
     /// Each marker is the one point on its node.
     pub film: Film,
+    /// The names of those whose parents follow from the motion, but not for certain.
+    pub unsure: Vec<String>,
 }
 
 /// A marker that was seen.
@@ -75,7 +78,7 @@ impl Document {
     /// The tree of the markers in the last `window_s` seconds of what lies between two times, s. Who is
     /// whose parent follows from `parents`, which are of the same names; without them from what the
     /// capture was given; and where that says nothing, from the motion: a marker's parent is the next one
-    /// towards the foot on the branches of the tree of all points.
+    /// towards the foot on the branches of the tree of all points, on which it lies in the picture.
     ///
     /// # Errors
     /// The capture has no markers, or none was seen, `parents` are of others, or `tracks.csv` is missing
@@ -108,15 +111,30 @@ impl Document {
                 dir: self.dir.clone(),
             });
         }
-        let parent_of = match parents {
+        let by_hand_of = match parents {
             Some(parents) => {
                 self.check_names(given, parents)?;
-                by_hand(&seen, parents)
+                Some(by_hand(&seen, parents))
             }
-            None if given.iter().any(|m| m.parent.is_some()) => by_hand(&seen, given),
-            None => by_motion(&seen, &points, &self.skeleton),
+            None if given.iter().any(|m| m.parent.is_some()) => Some(by_hand(&seen, given)),
+            None => None,
         };
-        Ok(self.marked(&seen, &parent_of, &points))
+        if let Some(parent_of) = by_hand_of {
+            return Ok(self.marked(&seen, &parent_of, &points));
+        }
+        let mut placed = Vec::with_capacity(seen.len());
+        for own in &seen {
+            placed.push(Placed {
+                rest_px: own.rest_px,
+                moves_with: points.node(TrackId::of_marker(own.marker)),
+            });
+        }
+        let carried = carried(&placed, &self.skeleton);
+        let parent_of: Vec<Option<usize>> = carried.iter().map(|c| c.parent).collect();
+        let mut marked = self.marked(&seen, &parent_of, &points);
+        let unsure = seen.iter().zip(&carried).filter(|(_, c)| !c.is_certain);
+        marked.unsure = unsure.map(|(own, _)| own.given.name.clone()).collect();
+        Ok(marked)
     }
 
     fn check_names(
@@ -181,6 +199,7 @@ impl Document {
             skeleton,
             names,
             film,
+            unsure: Vec::new(),
         }
     }
 }
@@ -257,43 +276,6 @@ fn by_hand(seen: &[Seen], parents: &[MarkerWindow]) -> Vec<Option<usize>> {
         parent_of.push(found);
     }
     parent_of
-}
-
-/// The parents that follow from the branches on which the motion puts the markers.
-fn by_motion(seen: &[Seen], points: &PointsRead, skeleton: &Skeleton) -> Vec<Option<usize>> {
-    let mut along = Vec::with_capacity(seen.len());
-    for own in seen {
-        let node = points.node(TrackId::of_marker(own.marker));
-        along.push(node.map(|node| (node, along_px(own.rest_px, node, skeleton))));
-    }
-    let mut parent_of = Vec::with_capacity(seen.len());
-    for k in 0..seen.len() {
-        parent_of.push(along[k].and_then(|(node, from_base_px)| {
-            let on_own = last_on(&along, node, from_base_px);
-            on_own.or_else(|| {
-                let mut below = skeleton.ancestors(node);
-                below.find_map(|node| last_on(&along, node, f64::INFINITY))
-            })
-        }));
-    }
-    parent_of
-}
-
-/// How far from the base of its branch a marker is, px.
-fn along_px(rest_px: Point2<f64>, node: NodeId, skeleton: &Skeleton) -> f64 {
-    let parent = skeleton.nodes[node.index()].parent.unwrap_or(node);
-    let base = skeleton.nodes[parent.index()].position;
-    distance(&skeleton.image_from_model(&base), &rest_px)
-}
-
-/// The marker on a node that is farthest from its base, but nearer than this, px.
-fn last_on(along: &[Option<(NodeId, f64)>], node: NodeId, before_px: f64) -> Option<usize> {
-    let placed = along.iter().enumerate();
-    let on_node = placed.filter_map(|(k, place)| Some((k, (*place)?)));
-    on_node
-        .filter(|(_, (on, px))| *on == node && *px < before_px)
-        .max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
-        .map(|(k, _)| k)
 }
 
 /// All indices, each after its parent; of a ring, which no reader lets pass, the rest is left out.
