@@ -57,13 +57,7 @@ impl Pose {
         let middle_px = homography.apply(Point2::origin()).coords;
         let ray = (middle_px / focal_px).push(1.0);
         let to_ray = Rotation3::rotation_between(&Vector3::z(), &ray)?;
-        // What a plane across the line of sight looks like: seen aslant in the picture.
-        let across: Matrix2<f64> = {
-            let m = to_ray.matrix();
-            let at = middle_px / focal_px;
-            let row = |i: usize, j: usize| m[(i, j)] - at[i] * m[(2, j)];
-            Matrix2::new(row(0, 0), row(0, 1), row(1, 0), row(1, 1))
-        };
+        let across = seen_across(&to_ray, middle_px / focal_px);
         let seen = across.try_inverse()? * homography.jacobian();
         let side_px = seen.singular_values().max();
         let plane = seen / side_px;
@@ -184,4 +178,11 @@ impl Pose {
         let ray = (self.middle_px / self.focal_px).push(1.0).normalize();
         (self.turned * Vector3::z()).dot(&ray).abs()
     }
+}
+
+/// What a plane across a line of sight looks like, that goes through (at, 1): it is seen aslant in the picture.
+fn seen_across(to_ray: &Rotation3<f64>, at: Vector2<f64>) -> Matrix2<f64> {
+    let turned = to_ray.matrix();
+    let flat = turned.fixed_view::<2, 2>(0, 0);
+    flat - at * turned.fixed_view::<1, 2>(2, 0)
 }

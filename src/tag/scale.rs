@@ -50,6 +50,14 @@ struct Way {
     foreshortened: f64,
 }
 
+impl Way {
+    /// Whether all of its numbers are such.
+    fn is_sound(&self) -> bool {
+        let numbers = [self.weight, self.side_sd_px, self.roll_sd_deg, self.side_px];
+        numbers.iter().all(|x| x.is_finite()) && self.side_px > 0.0
+    }
+}
+
 /// A roll within 90 degrees to either side: a tag that hangs upside down is upright, too. Printouts differ in
 /// which side is up, and no camera films upside down.
 fn upright_deg(roll_deg: f64) -> f64 {
@@ -75,16 +83,10 @@ pub fn scale_of(seen: &[TagSeen], size_m: f64, camera: &TagCamera) -> Option<Tag
         off.map(|off_px| off_px * off_px).sum()
     };
     let [narrow_px, side_px, wide_px] = spread_px(&ways);
-    let weight: f64 = ways.iter().map(|way| way.weight).sum();
-    let mean = |value: fn(&Way) -> f64| {
-        let sum: f64 = ways.iter().map(|way| way.weight * value(way)).sum();
-        sum / weight
-    };
-    let roll_deg = mean(|way| way.roll_deg);
-    let roll_squares: f64 = ways
-        .iter()
-        .map(|way| way.weight * (way.roll_sd_deg.powi(2) + (way.roll_deg - roll_deg).powi(2)))
-        .sum();
+    let roll_deg = mean(&ways, |way| way.roll_deg);
+    // That of each way, and that by which they differ.
+    let roll_squares = mean(&ways, |way| way.roll_sd_deg.powi(2) + way.roll_deg.powi(2));
+    let roll_sd_deg = (roll_squares - roll_deg.powi(2)).max(0.0).sqrt();
     Some(TagScale {
         id: first.tag.id,
         size_m,
@@ -93,10 +95,17 @@ pub fn scale_of(seen: &[TagSeen], size_m: f64, camera: &TagCamera) -> Option<Tag
         metres_per_px_lo: size_m / wide_px,
         metres_per_px_hi: size_m / narrow_px,
         roll_deg: upright_deg(roll_deg),
-        roll_sd_deg: (roll_squares / weight).sqrt(),
-        foreshortened: mean(|way| way.foreshortened),
+        roll_sd_deg,
+        foreshortened: mean(&ways, |way| way.foreshortened),
         moves_px: (squares / seen.len() as f64).sqrt(),
     })
+}
+
+/// The mean of a value of all ways, each by its weight.
+fn mean(ways: &[Way], value: fn(&Way) -> f64) -> f64 {
+    let weights: f64 = ways.iter().map(|way| way.weight).sum();
+    let sum: f64 = ways.iter().map(|way| way.weight * value(way)).sum();
+    sum / weights
 }
 
 /// All ways in which a tag may hang that is seen like this.
@@ -145,11 +154,7 @@ fn ways(seen: &[TagSeen], camera: &TagCamera) -> Option<Vec<Way>> {
             });
         }
     }
-    let is_sound = |way: &Way| {
-        let numbers = [way.weight, way.side_sd_px, way.roll_sd_deg, way.side_px];
-        numbers.iter().all(|x| x.is_finite()) && way.side_px > 0.0
-    };
-    ways.retain(is_sound);
+    ways.retain(Way::is_sound);
     ways.iter().any(|way| way.weight > 0.0).then_some(ways)
 }
 
