@@ -30,9 +30,13 @@ pub fn register_film(
     };
     let pairs: Vec<PlacePair> = pairs.iter().map(upright).collect();
     let found = by_pairs(&pairs, height_px)?;
-    // Three pairs are six numbers for five unknowns; lines say more, and how sure it is.
-    let finer = FilmFit::by_lines(found, &pieces, &scan_wood(tree), upright_in_wind(film));
-    let finer = finer.filter(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));
+    // Three pairs are six numbers for five unknowns; lines say more, and how sure it is. Where the pairs
+    // are from a tree in wind they may lead to another side of it.
+    let scan = scan_wood(tree);
+    let starts = std::iter::once(found).chain(by_lines(&wood, &scan));
+    let mut finer =
+        starts.filter_map(|start| FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)));
+    let finer = finer.find(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));
     Some(finer.unwrap_or_else(|| FilmFit::by_pairs(found)))
 }
 
