@@ -345,13 +345,14 @@ fn marked_tree(
 
 /// What is to be said of markers whose parents follow from the motion, but not for certain.
 fn unsure_parents(marked: &MarkedTree) -> Option<String> {
-    let (whose, which) = match &marked.unsure[..] {
-        [] => return None,
-        [one] => ("the parent of marker", one.clone()),
-        several => ("the parents of markers", several.join(", ")),
+    let (whose, them) = match marked.unsure.len() {
+        0 => return None,
+        1 => ("the parent of marker", "it"),
+        _ => ("the parents of markers", "them"),
     };
+    let which = marked.unsure.join(", ");
     Some(format!(
-        "{whose} {which} cannot be told for certain from place and motion; see what carries them, and give parents \
+        "{whose} {which} cannot be told for certain from place and motion; see what carries {them}, and give parents \
          with --markers=FILE"
     ))
 }

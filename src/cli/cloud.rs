@@ -37,7 +37,8 @@ const TWIG_RADII_MM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
 #[derive(Debug, Args)]
 pub struct CloudArgs {
-    /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc, .csv, .pts).
+    /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc, .csv, .pts); or a
+    /// tree as a table of cylinders (.csv) or a treefile (.txt).
     file: PathBuf,
     /// Folder for the tree, or for several trees and their scene. It must not exist, and appears
     /// when it is complete.

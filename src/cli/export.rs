@@ -273,15 +273,19 @@ impl<'a> Target<'a> {
             return Ok(Self::File(&args.out));
         };
         let ending = args.out.extension().unwrap_or_default();
-        let suffixes = Format::value_variants().iter().filter_map(Format::suffix);
-        let is_known = suffixes
-            .clone()
-            .any(|known| ending.eq_ignore_ascii_case(known));
-        // Others are named after it.
-        let is_several = matches!(args.format, Format::Gltf | Format::Obj);
-        if !ending.eq_ignore_ascii_case(own) && (is_known || is_several) {
+        if ending.eq_ignore_ascii_case(own) {
+            return Ok(Self::File(&args.out));
+        }
+        // The other files of these are named after it.
+        if matches!(args.format, Format::Gltf | Format::Obj) {
             return bad_usage(format!(
                 "--out {shown} does not end in .{own}, as this format must"
+            ));
+        }
+        let mut suffixes = Format::value_variants().iter().filter_map(Format::suffix);
+        if suffixes.any(|known| ending.eq_ignore_ascii_case(known)) {
+            return bad_usage(format!(
+                "--out {shown} ends as another format does; end it in .{own}"
             ));
         }
         Ok(Self::File(&args.out))

@@ -70,12 +70,7 @@ pub fn draw(
     let studio = Studio::new(tree, shot)?;
     match kind {
         Kind::Picture => write_picture(out, &studio.picture()?, stop),
-        Kind::Video => {
-            let written = studio.video(out, stop.while_writing());
-            written.map_err(video_error)?;
-            print_written(out);
-            Ok(())
-        }
+        Kind::Video => video_written(studio.video(out, stop.while_writing()), out),
     }
 }
 
@@ -90,12 +85,7 @@ pub fn draw_forest(
     let studio = ForestStudio::new(forest, shot)?;
     match kind {
         Kind::Picture => write_picture(out, &studio.picture()?, stop),
-        Kind::Video => {
-            let written = studio.video(out, stop.while_writing());
-            written.map_err(video_error)?;
-            print_written(out);
-            Ok(())
-        }
+        Kind::Video => video_written(studio.video(out, stop.while_writing()), out),
     }
 }
 
@@ -104,6 +94,13 @@ fn write_picture(out: &Path, png: &[u8], stop: &Stop) -> Result<(), CommandError
     let file = OutputFile::create(out).map_err(write_error)?;
     file.write(png, stop).map_err(write_error)?;
     file.publish().map_err(write_error)?;
+    print_written(out);
+    Ok(())
+}
+
+/// What became of a video.
+fn video_written(written: Result<(), PrepareError>, out: &Path) -> Result<(), CommandError> {
+    written.map_err(video_error)?;
     print_written(out);
     Ok(())
 }

@@ -42,7 +42,8 @@ pub fn stop_on_signals(
     let stop = Arc::new(AtomicBool::new(false));
     let is_ending = Arc::new(AtomicBool::new(false));
     for signal in ending_signals(by_hangup) {
-        // A third one: where the message of the second could not be written.
+        // A closed terminal hangs up twice. The others end at once at the third, where the message of the
+        // second cannot be written.
         if signal != SIGHUP {
             register_conditional_shutdown(signal, i32::from(FAILED), is_ending.clone())
                 .map_err(CommandError::failed)?;
@@ -52,8 +53,7 @@ pub fn stop_on_signals(
     let signals = Signals::new([SIGINT, SIGTERM]).map_err(CommandError::failed)?;
     in_background("signals", move || {
         end_at_second(signals, &is_ending, unfinished.as_deref())
-    })
-    .map_err(CommandError::failed)?;
+    })?;
     Ok(stop)
 }
 

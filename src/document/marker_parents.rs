@@ -25,7 +25,7 @@ pub struct Carried {
 #[derive(Clone, Copy, Debug)]
 struct OnPiece {
     node: NodeId,
-    /// How far it is from the parent, as a share of the piece.
+    /// How far along it is from the parent, as a share of the piece; beyond an end it is below 0 or above 1.
     share: f64,
 }
 
@@ -55,7 +55,7 @@ pub fn carried(markers: &[Placed], skeleton: &Skeleton) -> Vec<Carried> {
         });
         all.push(Carried {
             parent,
-            is_certain: marker.moves_with.is_some() && parent == by_motion,
+            is_certain: markers.len() == 1 || marker.moves_with.is_some() && parent == by_motion,
         });
     }
     all
@@ -76,8 +76,8 @@ fn nearest(
         let base_px = skeleton.image_from_model(&skeleton.nodes[parent.index()].position);
         let piece = skeleton.image_from_model(&node.position) - base_px;
         let squares = piece.norm_squared().max(f64::MIN_POSITIVE);
-        let share = ((rest_px - base_px).dot(&piece) / squares).clamp(0.0, 1.0);
-        let off_px = (base_px + piece * share - rest_px).norm();
+        let share = (rest_px - base_px).dot(&piece) / squares;
+        let off_px = (base_px + piece * share.clamp(0.0, 1.0) - rest_px).norm();
         if best.is_none_or(|(best_px, _)| off_px < best_px) {
             best = Some((off_px, OnPiece { node: id, share }));
         }
@@ -184,6 +184,20 @@ mod tests {
         ];
         let expected = [Some(2), None, Some(4), Some(1), Some(1)];
         assert_eq!(carried(&markers, &forked()), expected.map(sure));
+    }
+
+    /// The wood is often drawn too short.
+    #[test]
+    fn beyond_a_tip_the_inner_marker_carries_in_any_order() {
+        let [inner, outer] = [placed(-64.0, 264.0, Some(4)), placed(-90.0, 290.0, Some(4))];
+        assert_eq!(
+            carried(&[inner, outer], &forked()),
+            [None, Some(0)].map(sure)
+        );
+        assert_eq!(
+            carried(&[outer, inner], &forked()),
+            [Some(1), None].map(sure)
+        );
     }
 
     #[test]

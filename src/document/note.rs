@@ -169,7 +169,7 @@ pub struct ScanFilmNote {
     #[serde(default)]
     pub shift_px: [f64; 2],
     /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
-    /// square over the tree, as a share of its height; `null` where pairs were given.
+    /// square over the tree, as a share of its height; `null` by pairs alone.
     #[serde(default)]
     pub off_hi: Option<f64>,
     /// Of a film in wind: how far the tree leans to the right against the scan, and `off_hi` for the
@@ -180,7 +180,7 @@ pub struct ScanFilmNote {
     pub rest_off_hi: Option<f64>,
     /// What it misses lines or pairs of places by, as a share of the tree's height.
     pub miss: f64,
-    /// The same from the best other side of the tree; `null` where pairs were given.
+    /// The same from the best other side of the tree; `null` where it was found by pairs.
     pub other_side_miss: Option<f64>,
     /// Pieces of branches that carry a filmed frequency.
     pub branches: u64,

@@ -51,6 +51,8 @@ pub enum ImportError {
         "its skeleton has no height: nothing of it is above the foot; turn it so that it stands upright"
     )]
     NoHeight,
+    #[error("pieces of it have no radius; give a table with all radii")]
+    NoRadius,
     #[error("it has {found} {what}, and at most {most} are read; simplify it")]
     TooMany {
         found: usize,

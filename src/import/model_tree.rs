@@ -2,6 +2,7 @@
 
 use super::error::ImportError;
 use super::sketch::refuse_more;
+use super::standing::MOST_LEVELS;
 use crate::model::{Sway, Swaying, Unidentified};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
@@ -53,7 +54,40 @@ pub(super) fn from_z_up([x, y, z]: [f64; 3]) -> Point3<f64> {
     Point3::new(x, z, -y)
 }
 
+/// A tree is not so many times as wide as it is high.
+const WIDEST: f64 = 8.0;
+
 impl ModelTree {
+    /// From its foot up, in the unit of the file.
+    ///
+    /// # Errors
+    /// It has none, or is far wider than high.
+    pub fn height(&self) -> Result<f64, ImportError> {
+        let foot = self.nodes[0].position;
+        let highest = self.nodes.iter().map(|n| n.position.y - foot.y);
+        let height = highest.fold(0.0, f64::max);
+        let far = self.nodes.iter().map(|n| (n.position - foot).norm());
+        match height > 0.0 && far.fold(0.0, f64::max) <= WIDEST * height {
+            true => Ok(height),
+            false => Err(ImportError::NoHeight),
+        }
+    }
+
+    /// Refuses more forks on one way from the foot than levels can be counted.
+    ///
+    /// # Errors
+    /// There are more.
+    pub fn refuse_deep(&self) -> Result<(), ImportError> {
+        let children = self.children();
+        let mut forks: Vec<usize> = Vec::with_capacity(self.nodes.len());
+        for (i, node) in self.nodes.iter().enumerate() {
+            let below = node.parent.map_or(0, |p| forks[p]);
+            forks.push(below + usize::from(children[i].len() > 1));
+        }
+        let most = forks.into_iter().max().unwrap_or_default();
+        refuse_more("forks on one way", most, MOST_LEVELS)
+    }
+
     /// How the wood that ends in each node sways, as far as the file says: as the last of the pieces of its
     /// branch of which that is known.
     pub fn sways(&self) -> Vec<Swaying> {

@@ -10,10 +10,8 @@ use super::sketch::refuse_more;
 use crate::model::{NOT_FILMED_PX, Node, NodeId, Pose, Skeleton, Swaying};
 use nalgebra::{Point2, Point3, UnitQuaternion};
 
-/// A tree is not so many times as wide as it is high.
-const WIDEST: f64 = 8.0;
 /// Forks on one way from the foot: levels are counted in a byte.
-const MOST_LEVELS: usize = 250;
+pub(super) const MOST_LEVELS: usize = 250;
 
 /// The foot, the forks and the tips of a modelled tree, joined by straight branches.
 #[derive(Clone, Debug)]
@@ -32,14 +30,7 @@ impl StandingModel {
     /// # Errors
     /// The model has no height, is too wide, or has too many forks on one another.
     pub fn of(model: &ModelTree) -> Result<Self, ImportError> {
-        let foot = model.nodes[0].position;
-        let highest = model.nodes.iter().map(|n| n.position.y - foot.y);
-        let height = highest.fold(0.0, f64::max);
-        let far = model.nodes.iter().map(|n| (n.position - foot).norm());
-        if height <= 0.0 || far.fold(0.0, f64::max) > WIDEST * height {
-            return Err(ImportError::NoHeight);
-        }
-        let scale = NOT_FILMED_PX / height;
+        let scale = NOT_FILMED_PX / model.height()?;
         let forks = Forks::of(model)?;
         Ok(Self {
             skeleton: forks.skeleton(model, scale),

@@ -17,10 +17,11 @@ pub struct TagScale {
     pub metres_per_px_hi: f64,
     /// Angle from the upright of the picture to that of the tag, clockwise, degrees.
     pub roll_deg: f64,
-    /// The standard deviation of that by the edges of the tag. How upright it hangs is not in it.
+    /// The standard deviation of that, by the edges of the tag and the ways in which it may be turned. How
+    /// upright it hangs is not in it.
     #[serde(default)]
     pub roll_sd_deg: f64,
-    /// Its short over its long side as it is seen aslant: 1 from the front.
+    /// How much shorter it is along the direction in which it is seen aslant: 1 where it faces the camera.
     pub foreshortened: f64,
     /// How far its middle moves, px: root mean square about its mean place. It hangs still, so that this is
     /// how far the camera moves.

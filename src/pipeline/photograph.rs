@@ -348,7 +348,9 @@ impl Looked<'_> {
         first: SmallLook,
     ) -> Result<TreeInPhoto, PhotoError> {
         let trunk = settling.trunk(first).map_err(|e| not_seen(e, self.drawn))?;
-        let leaves = LeavesSeen::of(self.view(&attempt), self.cancel)
+        let mut settled = attempt.clone();
+        settled.strokes[0] = trunk.clone();
+        let leaves = LeavesSeen::of(self.view(&settled), self.cancel)
             .map_err(|e| not_seen(e, self.drawn))?;
         self.see_settled(&leaves, attempt, trunk)
     }

@@ -1,7 +1,7 @@
 //! The tree of a point cloud as a skeleton.
 
 use crate::cloud::{CloudFigures, CloudNode, CloudTree};
-use crate::import::ModelTree;
+use crate::import::{ImportError, ModelTree};
 use crate::model::{NOT_FILMED_PX, Node, NodeId, NodeKind, NodeName, Skeleton};
 use nalgebra::Point3;
 
@@ -50,9 +50,16 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
     }
 }
 
-/// A modelled tree as one of a scan, node by node; a unit of its file is so many metres. `None` where a
-/// radius is not known, or it has no height.
-pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Option<CloudTree> {
+/// A modelled tree as one of a scan, node by node; a unit of its file is so many metres.
+///
+/// # Errors
+/// A radius is not known, it has no height or is far wider than high, or too many forks on one way.
+pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, ImportError> {
+    let figures = CloudFigures {
+        height_m: metres_per_unit * model.height()?,
+        ..CloudFigures::default()
+    };
+    model.refuse_deep()?;
     let mut nodes = Vec::with_capacity(model.nodes.len());
     for node in &model.nodes {
         let at = node.position * metres_per_unit;
@@ -63,16 +70,13 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Option<CloudTree> 
             is_measured: false,
         });
     }
-    let foot_m = nodes.first()?.position.z;
-    let top_m = nodes.iter().map(|n| n.position.z).fold(foot_m, f64::max);
-    let is_thick = nodes.iter().skip(1).all(|n| n.radius > 0.0);
+    if nodes.iter().skip(1).any(|n| n.radius <= 0.0) {
+        return Err(ImportError::NoRadius);
+    }
     // The foot is as thick as what stands on it.
-    nodes[0].radius = nodes.get(1).map_or(0.0, |n| n.radius.max(nodes[0].radius));
-    let figures = CloudFigures {
-        height_m: top_m - foot_m,
-        ..CloudFigures::default()
-    };
-    (is_thick && figures.height_m > 0.0).then_some(CloudTree { nodes, figures })
+    let above_m = nodes.get(1).map_or(0.0, |n| n.radius);
+    nodes[0].radius = nodes[0].radius.max(above_m);
+    Ok(CloudTree { nodes, figures })
 }
 
 /// For each node the one in which its branch ends: the next fork or tip. The foot is its own.
@@ -89,6 +93,7 @@ fn movers(tree: &CloudTree, children: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::import::{ModelNode, Wood};
 
     /// A stem with a bend that forks; one of the two has a bend.
     #[test]
@@ -125,5 +130,59 @@ mod tests {
         assert_eq!(movers, [None, Some(2), None, None, Some(5), None]);
         let ends: Vec<u32> = scaled.skeleton.measured_branches().map(|n| n.0).collect();
         assert_eq!(ends, [2, 3, 5]);
+    }
+
+    fn piece(parent: Option<usize>, end: [f64; 3]) -> ModelNode {
+        ModelNode {
+            parent,
+            position: end.into(),
+            place: 0,
+            wood: Wood {
+                radius: 0.1,
+                sway: None,
+            },
+        }
+    }
+
+    /// A stem up along which one twig after the other leaves.
+    fn comb(twigs: usize, rise: f64) -> ModelTree {
+        let mut nodes = vec![piece(None, [0.0; 3])];
+        let mut below = 0;
+        for k in 1..=twigs {
+            let height = rise * k as f64;
+            nodes.push(piece(Some(below), [0.0, height, 0.0]));
+            below = nodes.len() - 1;
+            nodes.push(piece(Some(below), [1.0, height, 0.0]));
+        }
+        ModelTree {
+            nodes,
+            metres_per_unit: 0.0,
+        }
+    }
+
+    #[test]
+    fn a_table_that_no_picture_could_hold_is_refused() {
+        let tree = as_scanned(&comb(200, 0.1), 0.5).expect("a tree");
+        assert!((tree.figures.height_m - 10.0).abs() < 1e-9);
+        assert_eq!(tree.nodes.len(), 401);
+        // y up becomes z up.
+        assert_eq!(
+            tree.nodes[400].position,
+            Point3::new(0.5, 0.0, tree.figures.height_m)
+        );
+        let levels = stand_scanned(&tree)
+            .skeleton
+            .nodes
+            .iter()
+            .map(|n| n.level)
+            .max();
+        assert_eq!(levels, Some(201));
+        let deep = as_scanned(&comb(300, 0.1), 1.0);
+        assert!(matches!(deep, Err(ImportError::TooMany { .. })), "{deep:?}");
+        let flat = as_scanned(&comb(2, 1e-6), 1.0);
+        assert!(matches!(flat, Err(ImportError::NoHeight)), "{flat:?}");
+        let mut bare = comb(2, 1.0);
+        bare.nodes[2].wood.radius = 0.0;
+        assert!(matches!(as_scanned(&bare, 1.0), Err(ImportError::NoRadius)));
     }
 }

@@ -54,13 +54,14 @@ pub use asked::{Answer, Asked};
 pub use finish::Written;
 pub use job::{Job, Summary};
 pub use one_frame::{FrameError, one_frame};
-pub use parallel::{AtOnce, Undone, in_background, in_parallel};
+pub use parallel::{AtOnce, Undone, in_parallel};
 pub use play::{Played, play};
 pub use pulse::{Marks, Sign, Vigil};
 pub use record::{RecordJob, RunningRecord, record};
 pub use recorder_thread::{QUEUE_BYTES, RecordTo, Recorded};
 pub use shared::Failure;
 pub use source_thread::Pace;
+pub use spawn::in_background;
 pub use unfinished::{finish_unfinished, unfinished_dir};
 pub use watched::open;
 

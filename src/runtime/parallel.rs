@@ -1,7 +1,7 @@
 //! Independent pieces of work on several threads.
 
+use crate::caught::{catching, caught};
 use crate::pipeline::Both;
-use std::io;
 use std::panic::resume_unwind;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -58,13 +58,20 @@ pub fn beside<A: Send, B>(
     first: impl Fn() -> A + Sync,
     second: impl FnOnce() -> B,
 ) -> (A, B) {
+    let is_caught = catching();
     thread::scope(|scope| {
-        let thread = thread::Builder::new()
-            .name(name.into())
-            .spawn_scoped(scope, &first);
+        let thread =
+            thread::Builder::new()
+                .name(name.into())
+                .spawn_scoped(scope, || match is_caught {
+                    true => caught(&first),
+                    false => Some(first()),
+                });
         let b = second();
         match thread.map(thread::ScopedJoinHandle::join) {
-            Ok(Ok(a)) => (a, b),
+            Ok(Ok(Some(a))) => (a, b),
+            // It would have been caught here.
+            Ok(Ok(None)) => panic!("{name} has panicked"),
             Ok(Err(panic)) => resume_unwind(panic),
             Err(_) => (first(), b),
         }
@@ -79,15 +86,6 @@ impl Both for AtOnce {
     fn both<A: Send, B>(&self, first: impl Fn() -> A + Sync, second: impl FnOnce() -> B) -> (A, B) {
         beside("beside", first, second)
     }
-}
-
-/// Does `work` on a thread of this name, which nobody waits for.
-///
-/// # Errors
-/// There is no thread to be had.
-pub fn in_background(name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
-    let thread = thread::Builder::new().name(name.into());
-    thread.spawn(work).map(drop)
 }
 
 /// The pieces, shared by all threads.

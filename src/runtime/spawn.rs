@@ -14,3 +14,11 @@ pub fn spawn<T: Send + 'static>(
     let thread = std::thread::Builder::new().name(name.into());
     thread.spawn(run).map_err(Failure::Thread)
 }
+
+/// Does `work` on a thread of this name, which nobody waits for.
+///
+/// # Errors
+/// There is no thread to be had.
+pub fn in_background(name: &str, work: impl FnOnce() + Send + 'static) -> Result<(), Failure> {
+    spawn(name, work).map(drop)
+}

@@ -13,7 +13,7 @@ const STRAIGHT: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Which nodes of the flat skeleton are trunk: the foot, the trunk's top, and with a leader the
 /// chain that goes on from there along it; where none leads on, the chain of those that carry more than half
-/// of the tree's points, as a stem does that only twigs leave. `carried` is how many points each node
+/// of the tree's points, as a stem does that only smaller branches leave. `carried` is how many points each node
 /// carries, `leader_px` the line that was drawn, from the foot up, px; it counts only with
 /// [`Leader::Drawn`].
 pub fn trunk(
@@ -32,14 +32,14 @@ pub fn trunk(
         .filter(|v| v.is_finite())
         .fold(foot.y, f64::min);
     let reach = REACH * (foot.y - top_v);
-    let all = carried.first().copied().unwrap_or_default();
+    let all = u64::from(carried.first().copied().unwrap_or_default());
     let mut at = flat.iter().position(|n| n.level == 1);
     while let Some(from) = at {
         let children =
             (0..flat.len()).filter(|&i| flat[i].parent == Some(from) && flat[i].level >= 2);
         let stem = children
             .clone()
-            .find(|&i| carried.get(i).is_some_and(|own| 2 * own > all));
+            .find(|&i| carried.get(i).is_some_and(|own| 2 * u64::from(*own) > all));
         let led = match leader {
             Leader::None => None,
             Leader::Drawn => nearest(

@@ -41,6 +41,8 @@ impl TagSeen {
 
 /// A way in which a tag may hang before its camera.
 struct Way {
+    /// Logarithm of how likely it is, and how likely against the likeliest.
+    log_weight: f64,
     weight: f64,
     /// Pixels for its side where that is parallel to the picture, and the standard deviation of that.
     side_px: f64,
@@ -53,7 +55,12 @@ struct Way {
 impl Way {
     /// Whether all of its numbers are such.
     fn is_sound(&self) -> bool {
-        let numbers = [self.weight, self.side_sd_px, self.roll_sd_deg, self.side_px];
+        let numbers = [
+            self.log_weight,
+            self.side_sd_px,
+            self.roll_sd_deg,
+            self.side_px,
+        ];
         numbers.iter().all(|x| x.is_finite()) && self.side_px > 0.0
     }
 }
@@ -145,7 +152,8 @@ fn ways(seen: &[TagSeen], camera: &TagCamera) -> Option<Vec<Way>> {
                 roll_deg -= 360.0 * ((roll_deg - first.roll_deg) / 360.0).round();
             }
             ways.push(Way {
-                weight: focal.weight * (-0.5 * (misfit + aim * aim)).exp(),
+                log_weight: focal.weight.ln() - 0.5 * (misfit + aim * aim),
+                weight: 0.0,
                 side_px: fitted.pose.side_px,
                 side_sd_px: fitted.pose.side_px * side_share,
                 roll_deg,
@@ -155,7 +163,15 @@ fn ways(seen: &[TagSeen], camera: &TagCamera) -> Option<Vec<Way>> {
         }
     }
     ways.retain(Way::is_sound);
-    ways.iter().any(|way| way.weight > 0.0).then_some(ways)
+    // Against the likeliest: none of a large tag may fit well.
+    let best = ways
+        .iter()
+        .map(|way| way.log_weight)
+        .max_by(f64::total_cmp)?;
+    for way in &mut ways {
+        way.weight = (way.log_weight - best).exp();
+    }
+    Some(ways)
 }
 
 /// The corners that all sights have in common, from where the camera's axis meets the picture, px: the camera

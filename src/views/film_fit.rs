@@ -32,7 +32,7 @@ const TAG_HANGS_SD_DEG: f64 = 0.5;
 pub struct FilmFit {
     pub registration: Registration,
     /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
-    /// square over the tree, as a share of its height; `None` by pairs of places.
+    /// square over the tree, as a share of its height; `None` by pairs of places alone.
     pub off_hi: Option<f64>,
     /// Of a film in wind.
     pub lean: Option<Lean>,

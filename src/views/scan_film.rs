@@ -33,7 +33,8 @@ pub fn register_film(
     // Three pairs are six numbers for five unknowns; lines say more, and how sure it is. Where the pairs
     // are from a tree in wind they may lead to another side of it.
     let scan = scan_wood(tree);
-    let starts = std::iter::once(found).chain(by_lines(&wood, &scan));
+    let by_itself = std::iter::once_with(|| by_lines(&wood, &scan)).flatten();
+    let starts = std::iter::once(found).chain(by_itself);
     let mut finer =
         starts.filter_map(|start| FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)));
     let finer = finer.find(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));

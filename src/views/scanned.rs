@@ -35,8 +35,8 @@ impl FilmOnScan {
 
     /// That of a registration which lines did not make surer.
     fn unsure_warning(&self) -> Option<String> {
-        let unsure = "the film lies on the scan by its pairs alone, and nothing says how surely: the lines of the two do \
-                      not agree with them; give five pairs or more, all over the tree";
+        let unsure = "the film lies on the scan by its pairs alone, and nothing says how surely: the lines of film and \
+                      scan do not confirm it; more pairs, all over the tree, make it surer";
         self.fit.off_hi.is_none().then(|| unsure.to_owned())
     }
 
@@ -145,7 +145,8 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         cell_m: figures.cell_m,
         noise_m: figures.noise_m,
         twig_radius_m: figures.twig_radius_m,
-        on_wood: Some(figures.on_wood),
+        // A table of cylinders has no points.
+        on_wood: (figures.points > 0).then_some(figures.on_wood),
         foot_share: figures.foot_share,
         clear_stem: figures.clear_stem,
         fork_below: figures.fork_below,

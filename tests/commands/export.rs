@@ -578,6 +578,11 @@ const CASES: &[Case] = &[
         &["does not end in .gltf"],
     ),
     (
+        "{c} --format glb --out {w}/t.obj",
+        BAD_USAGE,
+        &["ends as another format does", ".glb"],
+    ),
+    (
         "{c} --format obj --out {w}/t",
         BAD_USAGE,
         &["does not end in .obj"],

@@ -35,8 +35,8 @@ pub fn read(path: &Path) -> Result<Option<ModelTree>, CommandError> {
     }
     let mut begin = Vec::new();
     // What cannot be read is named by the reader of points.
-    let is_read = File::open(path).and_then(|file| file.take(BEGIN).read_to_end(&mut begin));
-    if is_read.is_err() || !is_wood_table(&String::from_utf8_lossy(&begin)) {
+    let read = File::open(path).and_then(|file| file.take(BEGIN).read_to_end(&mut begin));
+    if read.is_err() || !is_wood_table(&String::from_utf8_lossy(&begin)) {
         return Ok(None);
     }
     let bytes = read_bounded(path, LARGEST).map_err(|e| {
@@ -68,12 +68,13 @@ pub fn write(
             unused::note(option, "the file is a table of a tree, and no point cloud");
         }
     }
+    if film.is_some() && table.nodes.iter().any(|node| node.wood.sway.is_some()) {
+        eprint_line(
+            "arborcam: note: the frequencies of the table are left out for those of the film",
+        );
+    }
     let metres = args.unit.map_or(1.0, Unit::metres);
-    let tree = as_scanned(table, metres).ok_or_else(|| {
-        args.failed(anyhow!(
-            "pieces of it have no radius, or it has no height; give a table with all radii"
-        ))
-    })?;
+    let tree = as_scanned(table, metres).map_err(|e| args.failed(e))?;
     let name = args.file.file_name().unwrap_or_default();
     let scan = Scan {
         name: name.to_string_lossy().into_owned(),
