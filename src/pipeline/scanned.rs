@@ -176,7 +176,7 @@ mod tests {
             .iter()
             .map(|n| n.level)
             .max();
-        assert_eq!(levels, Some(201));
+        assert_eq!(levels, Some(200));
         let deep = as_scanned(&comb(300, 0.1), 1.0);
         assert!(matches!(deep, Err(ImportError::TooMany { .. })), "{deep:?}");
         let flat = as_scanned(&comb(2, 1e-6), 1.0);

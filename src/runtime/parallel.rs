@@ -70,8 +70,8 @@ pub fn beside<A: Send, B>(
         let b = second();
         match thread.map(thread::ScopedJoinHandle::join) {
             Ok(Ok(Some(a))) => (a, b),
-            // It would have been caught here.
-            Ok(Ok(None)) => panic!("{name} has panicked"),
+            // It is caught where its caller's would be.
+            Ok(Ok(None)) => resume_unwind(Box::new("the work beside has panicked")),
             Ok(Err(panic)) => resume_unwind(panic),
             Err(_) => (first(), b),
         }
