@@ -110,13 +110,16 @@ fn short_name(path: &Path) -> String {
 }
 
 /// The bytes of a drawing or a model.
-fn read_file(path: &Path) -> Result<Vec<u8>, CommandError> {
+///
+/// # Errors
+/// The file cannot be read, or is too large.
+pub fn read_file(path: &Path) -> Result<Vec<u8>, CommandError> {
     read_bounded(path, LARGEST).map_err(|e| {
         CommandError::NoInput(anyhow!("cannot read {}: {e}; give another", path.display()))
     })
 }
 
 /// The error of a file that gives no tree.
-fn unfit(path: &Path, e: ImportError) -> CommandError {
+pub fn unfit(path: &Path, e: ImportError) -> CommandError {
     CommandError::Failed(anyhow!("{}: {e}", path.display()))
 }

@@ -2,7 +2,6 @@
 
 use super::error::ImportError;
 use super::sketch::refuse_more;
-use super::standing::MOST_LEVELS;
 use crate::model::{Sway, Swaying, Unidentified};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
@@ -54,6 +53,8 @@ pub(super) fn from_z_up([x, y, z]: [f64; 3]) -> Point3<f64> {
     Point3::new(x, z, -y)
 }
 
+/// Forks on one way from the foot: levels are counted in a byte.
+const MOST_LEVELS: usize = 250;
 /// A tree is not so many times as wide as it is high.
 const WIDEST: f64 = 8.0;
 
@@ -79,12 +80,12 @@ impl ModelTree {
     /// There are more.
     pub fn refuse_deep(&self) -> Result<(), ImportError> {
         let children = self.children();
-        let mut forks: Vec<usize> = Vec::with_capacity(self.nodes.len());
+        let mut levels: Vec<usize> = Vec::with_capacity(self.nodes.len());
         for (i, node) in self.nodes.iter().enumerate() {
-            let below = node.parent.map_or(0, |p| forks[p]);
-            forks.push(below + usize::from(children[i].len() > 1));
+            let is_end = children[i].len() != 1;
+            levels.push(node.parent.map_or(0, |p| levels[p] + usize::from(is_end)));
         }
-        let most = forks.into_iter().max().unwrap_or_default();
+        let most = levels.into_iter().max().unwrap_or_default();
         refuse_more("forks on one way", most, MOST_LEVELS)
     }
 

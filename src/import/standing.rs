@@ -6,12 +6,8 @@
 use super::error::ImportError;
 use super::flat_tree::flat_node;
 use super::model_tree::ModelTree;
-use super::sketch::refuse_more;
 use crate::model::{NOT_FILMED_PX, Node, NodeId, Pose, Skeleton, Swaying};
 use nalgebra::{Point2, Point3, UnitQuaternion};
-
-/// Forks on one way from the foot: levels are counted in a byte.
-pub(super) const MOST_LEVELS: usize = 250;
 
 /// The foot, the forks and the tips of a modelled tree, joined by straight branches.
 #[derive(Clone, Debug)]
@@ -89,20 +85,18 @@ struct Forks {
 
 impl Forks {
     fn of(model: &ModelTree) -> Result<Self, ImportError> {
+        model.refuse_deep()?;
         let children = model.children();
         let mut forks = Self {
             of_model: Vec::new(),
             parents: Vec::new(),
         };
         let mut below: Vec<Option<usize>> = vec![None; model.nodes.len()];
-        let mut levels = Vec::new();
         for (i, node) in model.nodes.iter().enumerate() {
             let parent = node.parent.and_then(|p| below[p]);
             below[i] = parent;
             if node.parent.is_none() || children[i].len() != 1 {
                 below[i] = Some(forks.of_model.len());
-                levels.push(parent.map_or(0, |p| levels[p] + 1));
-                refuse_more("forks on one way", levels[levels.len() - 1], MOST_LEVELS)?;
                 forks.of_model.push(i);
                 forks.parents.push(parent);
             }

@@ -13,7 +13,8 @@ pub enum OutlineError {
         source: std::io::Error,
     },
     #[error(
-        "outline {name}: {what}; draw it on a frame of this clip, as a polygon (JSON) or a mask (PNG), or leave --outline out"
+        "outline {name}: {what}; draw it on a frame of this clip, as a polygon (JSON) or a mask (PNG), or leave \
+         --outline out"
     )]
     BadFile { name: String, what: String },
     #[error(

@@ -251,7 +251,8 @@ impl Looked<'_> {
         match trunk? {
             Some(trunk) => {
                 let strokes = drawn.strokes.clone();
-                let tree = self.see_settled(&leaves, drawn, trunk)?;
+                let settled = drawn.clone().along(trunk);
+                let tree = self.see_settled(&leaves, settled, drawn)?;
                 Ok(TreeInPhoto { strokes, ..tree })
             }
             None => self.see_beside(&leaves, drawn),
@@ -348,22 +349,19 @@ impl Looked<'_> {
         first: SmallLook,
     ) -> Result<TreeInPhoto, PhotoError> {
         let trunk = settling.trunk(first).map_err(|e| not_seen(e, self.drawn))?;
-        let mut settled = attempt.clone();
-        settled.strokes[0] = trunk.clone();
+        let settled = attempt.clone().along(trunk);
         let leaves = LeavesSeen::of(self.view(&settled), self.cancel)
             .map_err(|e| not_seen(e, self.drawn))?;
-        self.see_settled(&leaves, attempt, trunk)
+        self.see_settled(&leaves, settled, attempt)
     }
 
     /// The tree along a settled trunk, or as the attempt has it if nothing is seen there.
     fn see_settled(
         &self,
         leaves: &LeavesSeen,
+        settled: Attempt,
         attempt: Attempt,
-        trunk: Stroke,
     ) -> Result<TreeInPhoto, PhotoError> {
-        let mut settled = attempt.clone();
-        settled.strokes[0] = trunk;
         match self.see_beside(leaves, settled) {
             Err(PhotoError::Cancelled) => Err(PhotoError::Cancelled),
             Err(_) => self.see_beside(leaves, attempt),

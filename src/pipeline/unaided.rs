@@ -18,6 +18,14 @@ pub struct Attempt {
     pub strokes: Vec<Stroke>,
 }
 
+impl Attempt {
+    /// The same with another line for the trunk.
+    pub fn along(mut self, trunk: Stroke) -> Self {
+        self.strokes[0] = trunk;
+        self
+    }
+}
+
 /// Where a crown is looked for that was not drawn, in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {

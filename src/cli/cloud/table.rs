@@ -2,22 +2,19 @@
 
 use super::{CloudArgs, Scan, Unit};
 use crate::cli::command_error::CommandError;
+use crate::cli::example::{read_file, unfit};
 use crate::cli::output::eprint_line;
 use crate::cli::stop::Stop;
 use crate::cli::unused;
 use crate::config::Config;
 use crate::document::Document;
-use crate::files::read_bounded;
 use crate::import::{ModelTree, Units, is_wood_table, read_model};
 use crate::model::{PointCloud, Skeleton, Swaying, Unidentified};
 use crate::pipeline::as_scanned;
-use anyhow::anyhow;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Largest table that is read, bytes.
-const LARGEST: u64 = 256_000_000;
 /// A header is not longer, bytes.
 const BEGIN: u64 = 65_536;
 
@@ -39,11 +36,7 @@ pub fn read(path: &Path) -> Result<Option<ModelTree>, CommandError> {
     if read.is_err() || !is_wood_table(&String::from_utf8_lossy(&begin)) {
         return Ok(None);
     }
-    let bytes = read_bounded(path, LARGEST).map_err(|e| {
-        CommandError::NoInput(anyhow!("cannot read {}: {e}; give another", path.display()))
-    })?;
-    let model = read_model(&bytes, path);
-    let model = model.map_err(|e| CommandError::Failed(anyhow!("{}: {e}", path.display())))?;
+    let model = read_model(&read_file(path)?, path).map_err(|e| unfit(path, e))?;
     Ok(Some(model.tree))
 }
 
