@@ -2,6 +2,7 @@
 //! parent (Hu et al. sect. 5.3).
 
 use super::error::DocumentError;
+use super::marker_depths::MarkerDepths;
 use super::marker_parents::{Placed, carried};
 use super::nodes::NodesRead;
 use super::note::ModelNote;
@@ -14,8 +15,9 @@ use crate::model::{
     Foot, JointPose, Node, NodeId, NodeKind, NodeName, Pose, Skeleton, TrackId, Unidentified,
 };
 use crate::signal::statistics::median_vector;
-use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Point2, Point3, Quaternion, UnitQuaternion, Vector3, Vector4};
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 use std::path::Path;
 
 /// Markers as a tree, and their film.
@@ -30,6 +32,8 @@ pub struct MarkedTree {
     pub film: Film,
     /// The names of those whose parents follow from the motion, but not for certain.
     pub unsure: Vec<String>,
+    /// How far away a depth camera has seen them.
+    depths: MarkerDepths,
 }
 
 /// A marker that was seen.
@@ -160,6 +164,7 @@ impl Document {
         points: &PointsRead,
     ) -> MarkedTree {
         let foot_px = self.skeleton.foot_px;
+        let mut depths = MarkerDepths::before(self.note.depth.as_ref(), self.skeleton.image_size);
         let mut nodes = vec![node(NodeName(0), None, 0, Point3::origin())];
         let mut node_of: BTreeMap<usize, NodeId> = BTreeMap::new();
         let mut names = BTreeMap::new();
@@ -167,15 +172,15 @@ impl Document {
             let parent = parent_of[k].and_then(|p| node_of.get(&p).copied());
             let parent = parent.unwrap_or_default();
             let at = seen[k].rest_px - foot_px;
+            let own = NodeId(nodes.len() as u32);
+            depths.add(own, points.depths(TrackId::of_marker(seen[k].marker)));
+            // As deep as its parent where nobody has seen more.
+            let z = depths.rest_z_px(own);
+            let z = z.unwrap_or_else(|| nodes[parent.index()].position.z);
             let name = NodeName(seen[k].marker as u32 + 1);
             let level = nodes[parent.index()].level.saturating_add(1);
-            node_of.insert(k, NodeId(nodes.len() as u32));
-            nodes.push(node(
-                name,
-                Some(parent),
-                level,
-                Point3::new(at.x, -at.y, 0.0),
-            ));
+            node_of.insert(k, own);
+            nodes.push(node(name, Some(parent), level, Point3::new(at.x, -at.y, z)));
             names.insert(name, seen[k].given.name.clone());
         }
         // Parents stand before their children.
@@ -200,13 +205,15 @@ impl Document {
             names,
             film,
             unsure: Vec::new(),
+            depths,
         }
     }
 }
 
 impl MarkedTree {
     /// The poses of the tree in the frames of a part of its film, of which `skeleton` is where it rests: each
-    /// node is where its marker is, and nowhere while that is not seen.
+    /// node is where its marker is, and nowhere while that is not seen. In a film with depth it is nowhere
+    /// in space (its z is no number) while its depth is not seen; without depth all is in the picture's plane.
     pub fn poses(&self, film: &Film, skeleton: &Skeleton) -> Vec<Pose> {
         let n = skeleton.nodes.len();
         let nowhere = Point3::new(f64::NAN, f64::NAN, f64::NAN);
@@ -215,8 +222,12 @@ impl MarkedTree {
             let mut places = vec![nowhere; n];
             places[0] = Point3::origin();
             for track in &film.tracks {
-                let off = track.at_px[k] - skeleton.foot_px;
-                places[track.node.index()] = Point3::new(off.x, -off.y, 0.0);
+                let at_px = self
+                    .depths
+                    .at_rest_distance_px(track.node, *time_s, track.at_px[k]);
+                let off = at_px - skeleton.foot_px;
+                let z = self.depths.z_px(track.node, *time_s);
+                places[track.node.index()] = Point3::new(off.x, -off.y, z);
             }
             poses.push(Pose {
                 frame: k as u64,
@@ -228,19 +239,30 @@ impl MarkedTree {
     }
 }
 
-/// Where a node is, and how its branch has turned in the picture.
+/// Where a node is, and how its branch has turned: the least rotation from where it rests. It is no
+/// number where an end of the branch is nowhere in space.
 fn joint(i: usize, places: &[Point3<f64>], skeleton: &Skeleton) -> JointPose {
     let nodes = &skeleton.nodes;
     let mut joint = JointPose::at_rest(places[i]);
     if let Some(parent) = nodes[i].parent.map(NodeId::index) {
         let rest = nodes[i].position - nodes[parent].position;
         let now = places[i] - places[parent];
-        let angle = rest.xy().perp(&now.xy()).atan2(rest.xy().dot(&now.xy()));
-        if angle.is_finite() {
-            joint.rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-        }
+        joint.rotation = match now.iter().all(|x| x.is_finite()) {
+            true => turned(&rest, &now),
+            false => nowhere_turned(),
+        };
     }
     joint
+}
+
+/// The least rotation from one direction to another; in opposite directions about the line of sight.
+fn turned(from: &Vector3<f64>, to: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let half_turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI);
+    UnitQuaternion::rotation_between(from, to).unwrap_or(half_turn)
+}
+
+fn nowhere_turned() -> UnitQuaternion<f64> {
+    UnitQuaternion::new_unchecked(Quaternion::from(Vector4::repeat(f64::NAN)))
 }
 
 fn node(name: NodeName, parent: Option<NodeId>, level: u8, position: Point3<f64>) -> Node {
@@ -290,4 +312,75 @@ fn parents_first(parent_of: &[Option<usize>]) -> Vec<usize> {
         }
     }
     order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::document::tracks::DepthAt;
+    use crate::dynamics::{FilmTrack, angle_in_space_deg, angle_to_parent_deg};
+    use crate::model::Size;
+
+    /// A branch of 100 px that swings towards the camera and away is flat in the picture; depth shows
+    /// by how much.
+    #[test]
+    fn a_marker_that_swings_in_depth_has_its_angle_in_space() {
+        let image_size = Size {
+            width: 641,
+            height: 481,
+        };
+        let note = crate::document::note::DepthNote {
+            foot_m: 2.0,
+            metres_per_px: 0.004,
+            ..Default::default()
+        };
+        // The foot is on the camera's axis, the marker 0.4 m above it.
+        let foot_px = Point2::new(320.0, 240.0);
+        let angles_deg = [0.0_f64, 10.0, -10.0, 6.0, -6.0];
+        let (mut at_px, mut seen) = (Vec::new(), Vec::new());
+        for (k, deg) in angles_deg.iter().enumerate() {
+            let (sin, cos) = deg.to_radians().sin_cos();
+            let depth_m = 2.0 - 0.4 * sin;
+            at_px.push(Point2::new(320.0, 240.0 - 500.0 * 0.4 * cos / depth_m));
+            seen.push(DepthAt {
+                time_s: k as f64,
+                depth_m,
+            });
+        }
+        let mut depths = MarkerDepths::before(Some(&note), image_size);
+        depths.add(NodeId(1), seen);
+        let skeleton = Skeleton {
+            nodes: vec![
+                node(NodeName(0), None, 0, Point3::origin()),
+                node(
+                    NodeName(1),
+                    Some(NodeId(0)),
+                    1,
+                    Point3::new(0.0, 100.0, 0.0),
+                ),
+            ],
+            foot_px,
+            image_size,
+        };
+        let track = FilmTrack {
+            node: NodeId(1),
+            at_px,
+        };
+        let film = Film::new(&[0.0, 1.0, 2.0, 3.0, 4.0], vec![track]);
+        let marked = MarkedTree {
+            skeleton: skeleton.clone(),
+            names: BTreeMap::new(),
+            film: film.clone(),
+            unsure: Vec::new(),
+            depths,
+        };
+        let poses = marked.poses(&film, &skeleton);
+        let space = angle_in_space_deg(&skeleton, &poses, NodeId(1));
+        let sign = (space[1] * angles_deg[1]).signum();
+        for (found, wanted) in space.iter().zip(angles_deg) {
+            assert!((found * sign - wanted).abs() < 1e-6, "{space:?}");
+        }
+        let plane = angle_to_parent_deg(&skeleton, &poses, NodeId(1));
+        assert!(plane.iter().all(|a| a.abs() < 1e-6), "{plane:?}");
+    }
 }

@@ -14,6 +14,7 @@ mod camera;
 mod error;
 mod forest;
 mod marked;
+mod marker_depths;
 mod marker_parents;
 mod modes;
 mod motion;

@@ -9,7 +9,8 @@ use crate::bounds::Bounds;
 use crate::dynamics::Film;
 use crate::files::{OutputFolder, WriteError};
 use crate::model::{
-    CameraMotion, LogWindow, NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog, TrackSet,
+    CameraMotion, DepthSeen, LogWindow, NodeId, NodeName, Observation, Skeleton, TrackId, TrackLog,
+    TrackSet,
 };
 use csv::{ReaderBuilder, StringRecord, Writer};
 use nalgebra::Point2;
@@ -183,6 +184,14 @@ fn at_px(id: TrackId, u_px: f32, v_px: f32) -> Observation {
     }
 }
 
+/// How far away a point was at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DepthAt {
+    pub time_s: f64,
+    /// Along the camera's axis, m.
+    pub depth_m: f64,
+}
+
 /// Points of a film, without the camera's motion, and on which node each of them is.
 pub(super) struct PointsRead {
     log: TrackLog,
@@ -218,6 +227,21 @@ impl PointsRead {
         seen.filter(|o| o.id == id)
             .map(Observation::at_px)
             .collect()
+    }
+
+    /// How far away a depth camera has seen a point, in order of time.
+    pub fn depths(&self, id: TrackId) -> Vec<DepthAt> {
+        let mut depths = Vec::new();
+        for set in self.log.all().sets() {
+            let seen = set.observations.iter().find(|o| o.id == id);
+            if let Some(depth) = seen.and_then(|o| o.depth) {
+                depths.push(DepthAt {
+                    time_s: set.time_s,
+                    depth_m: depth.depth_m.into(),
+                });
+            }
+        }
+        depths
     }
 }
 
@@ -269,8 +293,32 @@ pub(super) fn read_points(
 /// Reads a table of points row by row.
 struct TracksReader<'a> {
     table: TableReader<File, 6>,
+    depth: DepthColumns,
     by_name: &'a BTreeMap<NodeName, NodeId>,
     next: Option<TrackRow>,
+}
+
+/// The columns of what a depth camera has seen, which a film without one lacks.
+struct DepthColumns {
+    depth_m: Option<usize>,
+    sd_m: Option<usize>,
+}
+
+impl DepthColumns {
+    fn of(table: &TableReader<File, 6>) -> Self {
+        Self {
+            depth_m: table.optional("depth_m"),
+            sd_m: table.optional("depth_sd_m"),
+        }
+    }
+
+    /// What the present row says; `None` where the depth camera saw nothing.
+    fn seen(&self, table: &TableReader<File, 6>) -> Option<DepthSeen> {
+        let number = |column| table.optional_cell(column).parse::<f32>().ok();
+        let (depth_m, sd_m) = (number(self.depth_m)?, number(self.sd_m)?);
+        let is_depth = depth_m.is_finite() && depth_m > 0.0 && sd_m.is_finite();
+        is_depth.then_some(DepthSeen { depth_m, sd_m })
+    }
 }
 
 /// One point in one frame.
@@ -287,8 +335,10 @@ impl<'a> TracksReader<'a> {
         file: &'static str,
         by_name: &'a BTreeMap<NodeName, NodeId>,
     ) -> Result<Self, DocumentError> {
+        let table = TableReader::open(dir, file, COLUMNS)?;
         let mut reader = Self {
-            table: TableReader::open(dir, file, COLUMNS)?,
+            depth: DepthColumns::of(&table),
+            table,
             by_name,
             next: None,
         };
@@ -326,6 +376,7 @@ impl<'a> TracksReader<'a> {
             observation: at_px(TrackId(table.whole(0, "track_id")?), u_px, v_px),
             node: None,
         };
+        row.observation.depth = self.depth.seen(table);
         if !table.cell(5).is_empty() {
             let name = NodeName(table.whole(5, "node_id")?);
             let node = self.by_name.get(&name).copied();

@@ -51,6 +51,8 @@ struct Piece {
     /// The one in which it goes on.
     extension: Option<usize>,
     sway: SwayColumns,
+    /// The nearest cylinder at or below it that has a frequency: what that carries swings with it.
+    nearest: Option<usize>,
 }
 
 /// The branches of one order.
@@ -112,6 +114,7 @@ impl Qsm {
                 reverse_order: 1,
                 extension: None,
                 sway: sway_of(skeleton, sway, node),
+                nearest: None,
             });
         }
         let mut qsm = Self {
@@ -148,6 +151,10 @@ impl Qsm {
         let mut segments = 0;
         for i in 0..pieces.len() {
             let parent = pieces[i].parent;
+            pieces[i].nearest = match pieces[i].sway.frequency() {
+                Some(_) => Some(i),
+                None => parent.and_then(|p| pieces[p].nearest),
+            };
             let goes_on =
                 parent.filter(|p| children[*p] == 1 && pieces[*p].branch == pieces[i].branch);
             if let Some(p) = goes_on {
@@ -173,12 +180,15 @@ impl Qsm {
 
     /// Writes the table of cylinders. Numbers count from 0 as those of SimpleForest do, and the
     /// parent of what stands on the ground is -1; those of aRchi count from 1, and it is 0. What is
-    /// not known of the sway is empty.
+    /// not known of the sway is empty. Behind the cylinder's own sway stands that of the nearest branch
+    /// that was measured, at it or towards the foot, with the number of that branch: all that a branch
+    /// carries swings with it.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn table<W: Write>(&self, out: W) -> Result<W, WriteError> {
-        let header = format!("{HEADER},{}", SwayColumns::NAMES.join(","));
+        let own_names = SwayColumns::NAMES.join(",");
+        let header = format!("{HEADER},{own_names},nearest_branchID,{}", nearest_names());
         let mut table = TableWriter::new("qsm.csv", &header, out)?;
         let or_minus_one = |of: Option<usize>| of.map_or(-1.0, |n| n as f64);
         for (id, own) in self.pieces.iter().enumerate() {
@@ -208,17 +218,24 @@ impl Qsm {
             for x in own.sway.values() {
                 table.number(x, 5);
             }
+            let nearest = own.nearest.map(|n| &self.pieces[n]);
+            table.number(or_minus_one(nearest.map(|n| n.branch)), 0);
+            for x in self.nearest_sway(own).values() {
+                table.number(x, 5);
+            }
             table.end_row()?;
         }
         table.finish()
     }
 
     /// The treefile: one line for the tree. Its first segment is the foot, each other one ends a
-    /// cylinder. Frequencies and damping ratios that are not known are `nan`.
+    /// cylinder. Frequencies and damping ratios that are not known are `nan`. Own sway and that of the
+    /// nearest measured branch stand beside each other as in [`table`](Self::table).
     pub fn treefile(&self) -> String {
-        let names = SwayColumns::NAMES.join(",");
+        let (names, nearest) = (SwayColumns::NAMES.join(","), nearest_names());
         let mut text = format!(
-            "# tree file: segments end at x,y,z; parents count from 0; z is up\nx,y,z,radius,parent_id,{names}\n"
+            "# tree file: segments end at x,y,z; parents count from 0; z is up\n\
+             x,y,z,radius,parent_id,{names},{nearest}\n"
         );
         let Some(first) = self.pieces.first() else {
             return text;
@@ -228,15 +245,21 @@ impl Qsm {
             &first.start,
             first.radius,
             -1,
-            &SwayColumns::of(None),
+            [&SwayColumns::of(None); 2],
         );
         for own in &self.pieces {
             let parent = own.parent.map_or(0, |p| p as i64 + 1);
             text.push_str(", ");
-            push_segment(&mut text, &own.end, own.radius, parent, &own.sway);
+            let sways = [&own.sway, &self.nearest_sway(own)];
+            push_segment(&mut text, &own.end, own.radius, parent, sways);
         }
         text.push('\n');
         text
+    }
+
+    fn nearest_sway(&self, own: &Piece) -> SwayColumns {
+        let nearest = own.nearest.map(|n| self.pieces[n].sway);
+        nearest.unwrap_or(SwayColumns::of(None))
     }
 
     /// Sums by order, the trunk's first.
@@ -270,14 +293,27 @@ fn sway_of(skeleton: &Skeleton, sway: &[Swaying], node: NodeId) -> SwayColumns {
     SwayColumns::of(sway.get(mover.index()).and_then(|s| s.as_ref().ok()))
 }
 
-fn push_segment(text: &mut String, at: &Point3<f64>, radius: f64, parent: i64, sway: &SwayColumns) {
+/// The columns of the sway of the nearest measured branch.
+fn nearest_names() -> String {
+    SwayColumns::NAMES
+        .map(|name| format!("nearest_{name}"))
+        .join(",")
+}
+
+fn push_segment(
+    text: &mut String,
+    at: &Point3<f64>,
+    radius: f64,
+    parent: i64,
+    sways: [&SwayColumns; 2],
+) {
     // Writing to a string does not fail.
     let _ = write!(
         text,
         "{:.DECIMALS$},{:.DECIMALS$},{:.DECIMALS$},{radius:.DECIMALS$},{parent}",
         at.x, at.y, at.z
     );
-    for x in sway.values() {
+    for x in sways.iter().flat_map(|sway| sway.values()) {
         let _ = match x.is_finite() {
             true => write!(text, ",{x:.5}"),
             false => write!(text, ",nan"),
@@ -293,6 +329,11 @@ mod tests {
 
     /// The forked skeleton, drawn without curls and twigs; its left limb sways.
     fn qsm() -> Qsm {
+        swaying(&[(2, 2.0)])
+    }
+
+    /// The same with these frequencies of nodes, Hz.
+    fn swaying(measured: &[(usize, f64)]) -> Qsm {
         let skeleton = Skeleton::forked();
         let plain = crate::config::Wood {
             curl: 0.0,
@@ -302,17 +343,19 @@ mod tests {
         let limbs = crate::shape::limbs(&skeleton, &|_, _| false, &plain, 0);
         let rows = cylinders_by_branch(&limbs, &skeleton);
         let mut sway = vec![Err(Unidentified::NotMeasured); 4];
-        let frequency_hz = Interval {
-            value: 2.0,
-            lo: 1.9,
-            hi: 2.1,
-        };
-        sway[2] = Ok(Sway {
-            frequency_hz,
-            damping_ratio: None,
-            excitation: Excitation::Release,
-            amplitude_deg: 3.0,
-        });
+        for (node, hz) in measured {
+            let frequency_hz = Interval {
+                value: *hz,
+                lo: 0.95 * hz,
+                hi: 1.05 * hz,
+            };
+            sway[*node] = Ok(Sway {
+                frequency_hz,
+                damping_ratio: None,
+                excitation: Excitation::Release,
+                amplitude_deg: 3.0,
+            });
+        }
         Qsm::new(
             &rows,
             &limbs,
@@ -356,6 +399,36 @@ mod tests {
             .iter()
             .map(|row| row[column("length")].parse::<f64>().expect("number"));
         assert!((growth - lengths.sum::<f64>()).abs() < 0.01);
+    }
+
+    #[test]
+    fn all_that_a_measured_branch_carries_has_its_frequency() {
+        for (measured, trunk_hz) in [(vec![(2, 2.0)], ""), (vec![(1, 0.5), (2, 2.0)], "0.5")] {
+            let qsm = swaying(&measured);
+            let text = String::from_utf8(qsm.table(Vec::new()).expect("written")).expect("text");
+            let mut reader = csv::Reader::from_reader(text.as_bytes());
+            let header = reader.headers().expect("header").clone();
+            let at = |name: &str| header.iter().position(|h| h == name).expect("column");
+            let [own, nearest, branch, of] = [
+                at("frequency_hz"),
+                at("nearest_frequency_hz"),
+                at("branchID"),
+                at("nearest_branchID"),
+            ];
+            for row in reader.records().map(|r| r.expect("row")) {
+                let wanted = if row[own].is_empty() {
+                    trunk_hz
+                } else {
+                    &row[own]
+                };
+                assert_eq!(&row[nearest], wanted, "{row:?}");
+                match (&row[own], trunk_hz) {
+                    ("", "") => assert_eq!(&row[of], "-1"),
+                    ("", _) => assert_eq!(&row[of], "0"),
+                    _ => assert_eq!(&row[of], &row[branch]),
+                }
+            }
+        }
     }
 
     #[test]

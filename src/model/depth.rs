@@ -128,10 +128,16 @@ impl RestDepths {
     /// The same place in model axes.
     pub fn in_model(&self, seen: DepthSeen) -> NodeDepth {
         NodeDepth {
-            z_px: (self.foot_m - f64::from(seen.depth_m)) / self.metres_per_px,
+            z_px: depth_in_model_px(self.foot_m, self.metres_per_px, seen.depth_m.into()),
             sd_px: f64::from(seen.sd_m) / self.metres_per_px,
         }
     }
+}
+
+/// Where a place at `depth_m` is along the line of sight in model axes, px towards the viewer from a
+/// foot at `foot_m`, where a pixel is `metres_per_px` long.
+pub fn depth_in_model_px(foot_m: f64, metres_per_px: f64, depth_m: f64) -> f64 {
+    (foot_m - depth_m) / metres_per_px
 }
 
 #[cfg(test)]

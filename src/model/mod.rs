@@ -50,7 +50,7 @@ pub use capture_facts::{CaptureFacts, FilmCut, KnownMode, PointFacts, Shake, Swa
 pub use control::Control;
 pub use depth::{
     DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, METRES_UNIT_M, NodeDepth, Pinhole,
-    RestDepths,
+    RestDepths, depth_in_model_px,
 };
 pub use depth_rig::{CameraModel, DepthRig};
 pub use foot::{Foot, FootBasis, TrunkRow};

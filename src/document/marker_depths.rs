@@ -1,0 +1,176 @@
+//! How far away a depth camera has seen the markers of a film (Hu et al. sect. 4).
+
+use super::note::DepthNote;
+use super::tracks::DepthAt;
+use crate::model::{NodeId, Size, depth_in_model_px};
+use crate::signal::statistics::median;
+use nalgebra::Point2;
+use std::collections::BTreeMap;
+
+/// Depths of markers over time, by the node that each is. Without a depth camera all are in the picture's
+/// plane.
+#[derive(Clone, Debug)]
+pub(super) struct MarkerDepths {
+    foot: Option<FootSeen>,
+    of_node: BTreeMap<NodeId, DepthWay>,
+}
+
+/// The foot before the camera.
+#[derive(Clone, Copy, Debug)]
+struct FootSeen {
+    depth_m: f64,
+    metres_per_px: f64,
+    /// Where the camera's axis meets the picture, px: its middle. Off by 20 px, a marker that comes nearer
+    /// by a fortieth of its distance is off by half a pixel.
+    axis_px: Point2<f64>,
+}
+
+impl FootSeen {
+    fn z_px(&self, depth_m: f64) -> f64 {
+        depth_in_model_px(self.depth_m, self.metres_per_px, depth_m)
+    }
+}
+
+/// The depth of one marker.
+#[derive(Clone, Debug)]
+struct DepthWay {
+    /// The median.
+    rest_m: f64,
+    /// In order of time.
+    seen: Vec<DepthAt>,
+}
+
+impl MarkerDepths {
+    /// Of no marker yet, before the camera that has seen what `note` says.
+    pub fn before(note: Option<&DepthNote>, size: Size) -> Self {
+        let foot = note.filter(|note| note.metres_per_px > 0.0);
+        Self {
+            foot: foot.map(|note| FootSeen {
+                depth_m: note.foot_m,
+                metres_per_px: note.metres_per_px,
+                axis_px: Point2::new(
+                    0.5 * (f64::from(size.width) - 1.0),
+                    0.5 * (f64::from(size.height) - 1.0),
+                ),
+            }),
+            of_node: BTreeMap::new(),
+        }
+    }
+
+    /// Adds the marker that is `node`, as it was `seen` in order of time.
+    pub fn add(&mut self, node: NodeId, seen: Vec<DepthAt>) {
+        if self.foot.is_some() {
+            let depths_m = seen.iter().map(|at| at.depth_m).collect();
+            if let Some(rest_m) = median(depths_m, f64::total_cmp) {
+                self.of_node.insert(node, DepthWay { rest_m, seen });
+            }
+        }
+    }
+
+    /// Where a marker rests along the line of sight, px towards the viewer from the foot; 0 in a film
+    /// without depth, and `None` where only that of this marker was never seen.
+    pub fn rest_z_px(&self, node: NodeId) -> Option<f64> {
+        match self.foot {
+            None => Some(0.0),
+            Some(foot) => Some(foot.z_px(self.of_node.get(&node)?.rest_m)),
+        }
+    }
+
+    /// Where it is at a time; no number where that was not seen.
+    pub fn z_px(&self, node: NodeId, time_s: f64) -> f64 {
+        match self.foot {
+            None => 0.0,
+            Some(foot) => self.at(node, time_s).map_or(f64::NAN, |m| foot.z_px(m)),
+        }
+    }
+
+    /// Where a marker that is seen at `at_px` would be seen as far away as it rests: what comes nearer
+    /// moves outwards in the picture without any motion across.
+    pub fn at_rest_distance_px(
+        &self,
+        node: NodeId,
+        time_s: f64,
+        at_px: Point2<f64>,
+    ) -> Point2<f64> {
+        match (self.foot, self.of_node.get(&node), self.at(node, time_s)) {
+            (Some(foot), Some(way), Some(depth_m)) => {
+                foot.axis_px + (at_px - foot.axis_px) * (depth_m / way.rest_m)
+            }
+            _ => at_px,
+        }
+    }
+
+    fn at(&self, node: NodeId, time_s: f64) -> Option<f64> {
+        let seen = &self.of_node.get(&node)?.seen;
+        let found = seen.binary_search_by(|at| at.time_s.total_cmp(&time_s));
+        found.ok().map(|i| seen[i].depth_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MARKER: NodeId = NodeId(1);
+
+    /// A camera with focal length 500 px before a foot in 2 m: a pixel is 4 mm there.
+    fn camera() -> DepthNote {
+        DepthNote {
+            foot_m: 2.0,
+            metres_per_px: 0.004,
+            ..DepthNote::default()
+        }
+    }
+
+    fn seen(depths_m: &[f64]) -> Vec<DepthAt> {
+        let mut all = Vec::with_capacity(depths_m.len());
+        for (k, depth_m) in depths_m.iter().enumerate() {
+            all.push(DepthAt {
+                time_s: k as f64,
+                depth_m: *depth_m,
+            });
+        }
+        all
+    }
+
+    #[test]
+    fn what_comes_nearer_has_not_moved_across() {
+        let size = Size {
+            width: 641,
+            height: 481,
+        };
+        let mut depths = MarkerDepths::before(Some(&camera()), size);
+        let depths_m = [2.0, 1.9, 2.1];
+        depths.add(MARKER, seen(&depths_m));
+        assert_eq!(depths.rest_z_px(MARKER), Some(0.0));
+        for (k, depth_m) in depths_m.iter().enumerate() {
+            // 0.4 m right of the axis and 0.2 m above it.
+            let at_px = Point2::new(320.0 + 500.0 * 0.4 / depth_m, 240.0 - 500.0 * 0.2 / depth_m);
+            let found_px = depths.at_rest_distance_px(MARKER, k as f64, at_px);
+            assert!(
+                (found_px - Point2::new(420.0, 190.0)).norm() < 1e-9,
+                "{found_px}"
+            );
+            let z_px = depths.z_px(MARKER, k as f64);
+            assert!((z_px - (2.0 - depth_m) / 0.004).abs() < 1e-9, "{z_px}");
+        }
+    }
+
+    #[test]
+    fn a_depth_that_was_not_seen_is_no_number_and_without_a_camera_all_is_flat() {
+        let size = Size {
+            width: 640,
+            height: 480,
+        };
+        let mut depths = MarkerDepths::before(Some(&camera()), size);
+        depths.add(MARKER, seen(&[2.0]));
+        assert!(depths.z_px(MARKER, 0.5).is_nan() && depths.z_px(NodeId(2), 0.0).is_nan());
+        assert_eq!(depths.rest_z_px(NodeId(2)), None);
+        let mut flat = MarkerDepths::before(None, size);
+        flat.add(MARKER, seen(&[2.0]));
+        assert_eq!(
+            (flat.rest_z_px(MARKER), flat.z_px(MARKER, 0.5)),
+            (Some(0.0), 0.0)
+        );
+    }
+}
