@@ -22,6 +22,7 @@ pub use in_depth::in_depth_of;
 pub use lift::{assign_radii, lift_to_3d};
 pub use model::{First, Model, Moment};
 pub use sub_branches::SubBranch;
+pub use taper::assign_seen_radii;
 
 use crate::cancel::CancelToken;
 use crate::config::{Config, Leader};

@@ -5,16 +5,11 @@ use super::error::ImportError;
 use super::flat_tree::FlatTree;
 use super::join::joined;
 use super::sketch::{Sketch, Stroke};
-use crate::model::{BranchGraph, RADIUS_SHARE, Size, Skeleton};
+use crate::model::{BranchGraph, Size};
 use nalgebra::Point2;
 
-/// Up to this share of the tree's height the trunk is as thick as where it is thickest there.
-const FOOT_SHARE: f64 = 0.2;
-/// A tip is as thick as its branch is so far below it, px.
-const TIP_PX: f64 = 8.0;
-
 /// The flat tree of the branches that were traced in a picture of this `size`, with the radii that
-/// are seen, and 0.75 of the parent's where none is. Its crown has these corners, px.
+/// are seen, and 0 where none is. Its crown has these corners, px.
 ///
 /// # Errors
 /// There are no branches, or too many forks on one another.
@@ -29,78 +24,22 @@ pub fn traced(
         crown_px: crown_px.to_vec(),
     };
     let mut flat = joined(&sketch)?;
-    assign_radii(&mut flat, branches);
+    assign_seen(&mut flat, branches);
     flat.has_radii = true;
     Ok(flat)
 }
 
-/// Radii as they are seen, none larger than that of the parent. Where none is seen a branch begins
-/// with 0.75 of its parent's and tapers to its tip.
-fn assign_radii(flat: &mut FlatTree, branches: &BranchGraph) {
-    let beyond_px = beyond_px(&flat.skeleton);
-    let seen_px = seen_radii_px(flat, branches);
-    let skeleton = &mut flat.skeleton;
-    for i in 1..skeleton.nodes.len() {
-        let Some(parent) = skeleton.nodes[i].parent.map(|p| p.index()) else {
-            continue;
-        };
-        let seen_px = seen_px[i];
-        let piece_px = (skeleton.nodes[i].position - skeleton.nodes[parent].position).norm();
-        let goes_on = beyond_px[i] + piece_px >= beyond_px[parent];
-        let below_px = match skeleton.nodes[parent].radius {
-            0.0 => seen_px,
-            radius_px => radius_px,
-        };
-        skeleton.nodes[i].radius = if seen_px > 0.0 {
-            seen_px.min(below_px)
-        } else if goes_on {
-            let left = (beyond_px[i] + TIP_PX) / (beyond_px[parent] + TIP_PX);
-            below_px * left.sqrt()
-        } else {
-            RADIUS_SHARE * below_px
-        };
+/// The radius that is seen of the branch that ends in each node, px; 0 where none is.
+fn assign_seen(flat: &mut FlatTree, branches: &BranchGraph) {
+    let size = flat.skeleton.image_size;
+    for i in 0..flat.skeleton.nodes.len() {
+        let at_px = flat
+            .skeleton
+            .image_from_model(&flat.skeleton.nodes[i].position);
+        let piece = branches.piece_at(at_px, size);
+        let seen_px = piece.map_or(0.0, |piece| branches.nodes[piece].radius_px);
+        flat.skeleton.nodes[i].radius = seen_px;
     }
-    if let [foot, first, ..] = &mut skeleton.nodes[..] {
-        foot.radius = first.radius;
-    }
-}
-
-/// The radius that is seen of the branch that ends in each node, px; 0 where none is. In the lowest
-/// part of the trunk it is the largest there: the foot may lie in grass or shade.
-fn seen_radii_px(flat: &FlatTree, branches: &BranchGraph) -> Vec<f64> {
-    let skeleton = &flat.skeleton;
-    let mut seen_px = Vec::with_capacity(skeleton.nodes.len());
-    let heights = skeleton.nodes.iter().map(|n| n.position.y);
-    let low_px = FOOT_SHARE * heights.fold(0.0, f64::max);
-    let mut most_px = 0.0_f64;
-    let mut is_low = Vec::with_capacity(skeleton.nodes.len());
-    for node in &skeleton.nodes {
-        let at_px = skeleton.image_from_model(&node.position);
-        let piece = branches.piece_at(at_px, skeleton.image_size);
-        let own_px = piece.map_or(0.0, |piece| branches.nodes[piece].radius_px);
-        is_low.push(flat.is_on_trunk(at_px) && node.position.y <= low_px);
-        if is_low[is_low.len() - 1] {
-            most_px = most_px.max(own_px);
-        }
-        seen_px.push(own_px);
-    }
-    for (seen_px, is_low) in seen_px.iter_mut().zip(is_low) {
-        *seen_px = if is_low { most_px } else { *seen_px };
-    }
-    seen_px
-}
-
-/// How far the tree reaches beyond each node, px.
-fn beyond_px(skeleton: &Skeleton) -> Vec<f64> {
-    let nodes = &skeleton.nodes;
-    let mut beyond_px = vec![0.0_f64; nodes.len()];
-    for (i, node) in nodes.iter().enumerate().rev() {
-        if let Some(parent) = node.parent.map(|p| p.index()) {
-            let piece_px = (node.position - nodes[parent].position).norm();
-            beyond_px[parent] = beyond_px[parent].max(beyond_px[i] + piece_px);
-        }
-    }
-    beyond_px
 }
 
 /// The branches as strokes, the trunk first. At a fork the branch goes on in what reaches farthest.
@@ -180,7 +119,7 @@ mod tests {
         };
         assert_eq!(at(100.0, 200.0).radius, 4.25);
         assert_eq!(at(100.0, 60.0).radius, 2.0);
-        assert_eq!(at(160.0, 140.0).radius, RADIUS_SHARE * 4.25);
+        assert_eq!(at(160.0, 140.0).radius, 0.0);
         assert_eq!(flat.trunk_px.len(), 3, "{:?}", flat.trunk_px);
         assert!(traced(&BranchGraph::default(), Size::new(640, 360), &[]).is_err());
     }

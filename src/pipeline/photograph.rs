@@ -10,6 +10,7 @@ use crate::config::TraceBy;
 use crate::import::{FlatTree, ImportError, traced};
 use crate::model::{Outline, Rgb, Size, TreeStrokes};
 use crate::outline::{self, OutlineError, Reduced};
+use crate::solve::assign_seen_radii;
 use crate::wood::{self, LeafColour, LeafHint, LeavesSeen, NotSeen, SeenInPhotograph, Stroke};
 use nalgebra::Point2;
 
@@ -407,7 +408,7 @@ fn not_seen(e: NotSeen, drawn: &TreeStrokes) -> PhotoError {
 }
 
 impl TreeInPhoto {
-    /// The visible branches as a flat tree, with the radii that are seen.
+    /// The visible branches as a flat tree, with the radii that are seen, evened out.
     ///
     /// # Errors
     /// There are none, or too many on one another.
@@ -415,7 +416,12 @@ impl TreeInPhoto {
         let corners = self.crown.polygon_px.iter();
         let crown_px: Vec<Point2<f64>> = corners.map(|c| c.map(f64::from)).collect();
         let size = self.crown.size;
-        Ok(traced(&self.seen.wood.branches, size, &crown_px)?)
+        let mut flat = traced(&self.seen.wood.branches, size, &crown_px)?;
+        let nodes = &mut flat.skeleton.nodes;
+        let radii = nodes.iter().map(|node| node.radius);
+        let seen_px: Vec<Option<f64>> = radii.map(|r| (r > 0.0).then_some(r)).collect();
+        assign_seen_radii(nodes, &seen_px, !self.seen.in_leaf);
+        Ok(flat)
     }
 
     /// Where the tree is, in one piece: leaves and wood of one in leaf, the crown and the trunk of a

@@ -69,7 +69,7 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
 }
 
 /// Thickness of the branches whose wood the picture shows: from node to node as the skeleton says, and to
-/// a twig's at a tip. An unseen branch in which a seen one goes on begins as thick as that ends. Others stay
+/// a twig's at a tip. One that leaves another is no thicker at its begin than makes it as thick as it is seen. An unseen branch in which a seen one goes on begins as thick as that ends. Others stay
 /// as thick as they are, and like twigs no thicker than what they grow from.
 pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
     if skeleton.nodes.iter().all(|n| n.kind != NodeKind::Traced) {
@@ -91,11 +91,18 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
         let own = skeleton.nodes.get(limb.node.index());
         match own.filter(|_| !limb.twig && is_seen[limb.node.index()]) {
             Some(node) => {
-                let parent = node.parent.map(|p| &skeleton.nodes[p.index()]);
-                let from = parent.filter(|p| p.parent.is_some()).unwrap_or(node).radius;
                 let to = match goes_on[limb.node.index()] {
                     Some(_) => node.radius,
                     None => node.radius.min(tip_px(skeleton)),
+                };
+                let parent = node.parent.filter(|p| p.index() > 0).map(|p| p.index());
+                let below = parent.map_or(node.radius, |p| skeleton.nodes[p].radius);
+                let leaves = parent.is_some_and(|p| goes_on[p] != Some(limb.node));
+                // One that leaves another has its own radius in its middle.
+                let from = if leaves {
+                    below.min(2.0 * node.radius - to)
+                } else {
+                    below
                 };
                 taper(limb, from, to);
             }

@@ -1,7 +1,7 @@
 //! How thick the branches are whose wood is seen: widths as the picture shows them, evened out so
 //! that no branch grows thicker towards its tip.
 
-use crate::model::{Node, NodeId};
+use crate::model::{Node, NodeId, RADIUS_SHARE};
 use crate::shape::TIP_RADIUS_PX;
 
 /// Radii go with the length of wood that a branch bears to this power: the pipe model with da Vinci's
@@ -10,6 +10,8 @@ const PIPE_POWER: f64 = 1.0 / 2.5;
 /// So much thicker than the pipe model has it, with the constant of this tree, a branch may be. Where
 /// branches lie side by side, the picture shows them as one that is thicker.
 const WITHIN_PIPES: f64 = 1.3;
+/// A tip whose width is not seen is as thick as its branch is so far below it, px.
+const END_PX: f64 = 8.0;
 /// Wood that a tip bears besides what is drawn, px.
 const TIP_BORNE_PX: f64 = 3.0;
 
@@ -77,6 +79,32 @@ pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
         if let Some(parent) = nodes[i].parent.filter(|p| p.index() > 0) {
             nodes[i].radius = nodes[i].radius.min(nodes[parent.index()].radius);
         }
+    }
+}
+
+/// The radii of branches that a photograph shows, from those that are seen, px, by node: as [`taper`] has
+/// them, and of a bare tree [`within_pipes`]. Where none is seen a branch begins with
+/// [`RADIUS_SHARE`] of its parent's (Tan et al. 2008 sect. 2.2) and tapers to its tip.
+pub fn assign_seen_radii(nodes: &mut [Node], seen_px: &[Option<f64>], is_bare: bool) {
+    match is_bare {
+        true => taper(nodes, &within_pipes(nodes, seen_px)),
+        false => taper(nodes, seen_px),
+    }
+    let reach_px = reach_px(nodes);
+    for i in 1..nodes.len() {
+        let parent = nodes[i].parent.map(NodeId::index).filter(|p| *p > 0);
+        if let (Some(parent), None) = (parent, seen_at(seen_px, i)) {
+            let below_px = nodes[parent].radius;
+            let goes_on = reach_px[i] + edge_px(nodes, i) >= reach_px[parent];
+            let unseen_px = match goes_on {
+                true => below_px * ((reach_px[i] + END_PX) / (reach_px[parent] + END_PX)).sqrt(),
+                false => RADIUS_SHARE * below_px,
+            };
+            nodes[i].radius = nodes[i].radius.max(unseen_px);
+        }
+    }
+    if let [foot, first, ..] = nodes {
+        foot.radius = first.radius;
     }
 }
 
@@ -153,15 +181,14 @@ fn weighted_median(mut measures: Vec<Measure>) -> f64 {
 /// The axes of the tree: at every fork an axis goes on in the child from which it is farthest to a
 /// tip, and the others begin axes of their own.
 fn axes(nodes: &[Node]) -> Vec<Vec<usize>> {
-    let mut reach_px = vec![0.0_f64; nodes.len()];
+    let reach_px = reach_px(nodes);
     let mut next: Vec<Option<usize>> = vec![None; nodes.len()];
     for i in (1..nodes.len()).rev() {
         let Some(parent) = nodes[i].parent.map(NodeId::index).filter(|p| *p < i) else {
             continue;
         };
-        let px = reach_px[i] + edge_px(nodes, i);
-        if next[parent].is_none() || px > reach_px[parent] {
-            (reach_px[parent], next[parent]) = (px, Some(i));
+        if next[parent].is_none() && reach_px[i] + edge_px(nodes, i) >= reach_px[parent] {
+            next[parent] = Some(i);
         }
     }
     let mut axes = Vec::new();
@@ -173,6 +200,17 @@ fn axes(nodes: &[Node]) -> Vec<Vec<usize>> {
         axes.push(std::iter::successors(Some(i), |at| next[*at]).collect());
     }
     axes
+}
+
+/// How far it is from each node to the farthest tip beyond it, px.
+fn reach_px(nodes: &[Node]) -> Vec<f64> {
+    let mut reach_px = vec![0.0_f64; nodes.len()];
+    for i in (1..nodes.len()).rev() {
+        if let Some(parent) = nodes[i].parent.map(NodeId::index).filter(|p| *p < i) {
+            reach_px[parent] = reach_px[parent].max(reach_px[i] + edge_px(nodes, i));
+        }
+    }
+    reach_px
 }
 
 /// Length of the edge that ends in a node.
@@ -260,6 +298,29 @@ mod tests {
         assert!((3.0..5.5).contains(&tip_px), "{tip_px}");
         taper(&mut nodes, &within);
         assert!(nodes[7].radius <= tip_px, "{:?}", radii(&nodes));
+    }
+
+    /// A trunk before a shrub of its colours is seen as thin as the stroke along it: the wood above says more.
+    #[test]
+    fn a_photographed_trunk_that_is_hidden_below_does_not_make_a_wire() {
+        let mut nodes = tree();
+        let seen = [
+            None,
+            Some(1.5),
+            Some(1.5),
+            Some(7.0),
+            Some(7.0),
+            Some(6.0),
+            None,
+            None,
+        ];
+        assign_seen_radii(&mut nodes, &seen, false);
+        let radii = radii(&nodes);
+        assert!(radii[..4].iter().all(|px| *px >= 6.0), "{radii:?}");
+        assert_eq!(radii[5], 6.0);
+        // The branch whose width is not seen begins with a share of the trunk's, and tapers.
+        assert_eq!(radii[6], RADIUS_SHARE * radii[3]);
+        assert!((1.0..radii[6]).contains(&radii[7]), "{radii:?}");
     }
 
     #[test]

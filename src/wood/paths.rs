@@ -7,7 +7,7 @@ use super::mask::WoodMask;
 use super::ways::{Grid, Ways};
 use crate::model::{BranchGraph, WoodNode};
 use crate::signal::{corners, median};
-use nalgebra::Point2;
+use nalgebra::{Point2, distance};
 
 /// A branch explains the wood within so many of its radii, and so many pixels.
 const EXPLAINED_RADII: f32 = 1.3;
@@ -181,7 +181,12 @@ fn graph(grid: &Grid, tracks: &[Track], foot_px: Point2<f64>) -> BranchGraph {
             if n == 0 && parent.is_some() {
                 continue;
             }
-            let from = if n == 0 { 0 } else { kept[n - 1] };
+            let from = match (n, leaves[b]) {
+                (0, _) => 0,
+                // Within what it leaves a branch has the width of that.
+                (1, Some(_)) => first_beside(&line[..=index]),
+                _ => kept[n - 1],
+            };
             graph.nodes.push(WoodNode {
                 parent,
                 position_px: line[index].at_px,
@@ -199,6 +204,14 @@ fn graph(grid: &Grid, tracks: &[Track], foot_px: Point2<f64>) -> BranchGraph {
 struct Along {
     branch: usize,
     index: usize,
+}
+
+/// The first sample of a branch that lies beside the limb which it leaves; its last where none does.
+fn first_beside(line: &[Sample]) -> usize {
+    let Some(fork) = line.first() else { return 0 };
+    let is_beside = |s: &Sample| distance(&s.at_px, &fork.at_px) > fork.radius_px;
+    let beside = line.iter().position(is_beside);
+    beside.unwrap_or(line.len() - 1)
 }
 
 fn median_radius(samples: &[Sample]) -> f64 {
@@ -239,6 +252,22 @@ fn kept_samples(line: &[Sample], forks: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The first places of a branch lie in the limb that it leaves, and are as wide as that.
+    #[test]
+    fn a_branch_is_as_wide_as_beside_its_limb() {
+        let mut line = Vec::new();
+        for k in 0..12 {
+            line.push(Sample {
+                at_px: Point2::new(f64::from(k), 0.0),
+                radius_px: if k < 7 { 6.0 } else { 2.0 },
+            });
+        }
+        let first = first_beside(&line);
+        assert_eq!((first, median_radius(&line[first..])), (7, 2.0));
+        assert_eq!(first_beside(&line[..4]), 3);
+    }
+
     use crate::model::Size;
     use crate::signal::distance_to_segment;
     use nalgebra::distance;
