@@ -45,6 +45,10 @@ const THICK: f32 = 2.5;
 const LEAST_TRUNK_PX: f32 = 3.0;
 /// Below the trunk's foot, within so many of its radii, there are no branches.
 const NEAR_FOOT: f64 = 10.0;
+/// A branch is a wall of whose length, with all that it carries, so great a share runs level, and as much as
+/// this share of the whole tree's.
+const WALL_LEVEL: f64 = 0.2;
+const WALL_LENGTH: f64 = 0.005;
 /// Where so great a share of a piece of a branch is leaves, its width is not seen.
 const HIDDEN: f64 = 0.5;
 
@@ -212,6 +216,7 @@ pub fn beside_leaves(
     }
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
     let level_share = branches.level_share();
+    branches = without_walls(&branches, &on_strokes.is_stroke, size);
     hide_radii(&mut branches, leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -322,7 +327,8 @@ fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<
     Ok(())
 }
 
-/// The median of the radius along the lower half of a trunk; `None` where it is not in the picture.
+/// The median of the radius along the lower half of a trunk, in the middle of the wood there; `None` where it
+/// is not in the picture.
 fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
     let mut radii = Vec::new();
     for ends in trunk.windows(2) {
@@ -330,11 +336,37 @@ fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
         let count = way.norm().ceil().max(1.0) as usize;
         for step in 0..count {
             let at = ends[0] + way * (step as f64 / count as f64);
-            radii.extend(size.pixel_at(at).map(|pixel| inside_px[pixel]));
+            let pixel = size.pixel_at(at);
+            radii.extend(pixel.map(|pixel| inside_px[middle_of_wood(pixel, inside_px, size)]));
         }
     }
     radii.truncate(radii.len().div_ceil(2));
     median(radii, f32::total_cmp)
+}
+
+/// The pixel to which it always goes farther from the wood's edge, uphill from one pixel to the next; no
+/// farther than a stroke may lie beside its branch.
+fn middle_of_wood(from: usize, inside_px: &[f32], size: Size) -> usize {
+    let (width, height) = (size.width as usize, size.height as usize);
+    let most = (BESIDE_STROKE * width as f64) as usize;
+    let mut at = from;
+    for _ in 0..most {
+        let (u, v) = (at % width, at / width);
+        let mut best = at;
+        for v2 in v.saturating_sub(1)..=(v + 1).min(height - 1) {
+            for u2 in u.saturating_sub(1)..=(u + 1).min(width - 1) {
+                let other = v2 * width + u2;
+                if inside_px[other] > inside_px[best] {
+                    best = other;
+                }
+            }
+        }
+        if best == at {
+            break;
+        }
+        at = best;
+    }
+    at
 }
 
 /// A mask without wood.
@@ -366,6 +398,29 @@ fn without_roots(branches: &BranchGraph) -> BranchGraph {
         is_kept[i] = !is_below && !leads_below;
         carries[parent].all += 1;
         carries[parent].kept += usize::from(is_kept[i]);
+    }
+    branches.of_nodes(&is_kept)
+}
+
+/// The branches without those off the strokes of which much runs level, with all that they carry: edges of
+/// walls and rows of windows. What carries half of the tree is none.
+fn without_walls(branches: &BranchGraph, is_stroke: &[bool], size: Size) -> BranchGraph {
+    let carried = branches.carried_px();
+    let all_px = carried.first().map_or(0.0, |all| all.all_px);
+    let mut leads_to_stroke = vec![false; branches.nodes.len()];
+    for (i, node) in branches.nodes.iter().enumerate().rev() {
+        let pixel = size.pixel_at(node.position_px);
+        leads_to_stroke[i] |= pixel.is_some_and(|pixel| is_stroke[pixel]);
+        if let (Some(parent), true) = (node.parent, leads_to_stroke[i]) {
+            leads_to_stroke[parent] = true;
+        }
+    }
+    let mut is_kept = Vec::with_capacity(branches.nodes.len());
+    for (carried, leads_to_stroke) in carried.iter().zip(leads_to_stroke) {
+        let is_wall = carried.level_px > WALL_LEVEL * carried.all_px
+            && carried.level_px > WALL_LENGTH * all_px
+            && carried.all_px < 0.5 * all_px;
+        is_kept.push(leads_to_stroke || !is_wall);
     }
     branches.of_nodes(&is_kept)
 }
@@ -462,6 +517,48 @@ mod tests {
             pixels.extend(colour.map(|c: i64| (c + noise) as u8));
         }
         Rgb { size: SIZE, pixels }
+    }
+
+    /// A trunk that forks, and the edge of a wall that leads away from it: level, down, and level again.
+    #[test]
+    fn an_edge_of_a_wall_is_no_branch_but_where_it_was_drawn() {
+        let nodes = vec![
+            WoodNode::made_up(None, 160.0, 230.0),
+            WoodNode::made_up(Some(0), 160.0, 130.0),
+            WoodNode::made_up(Some(1), 100.0, 30.0),
+            WoodNode::made_up(Some(1), 230.0, 40.0),
+            WoodNode::made_up(Some(1), 260.0, 131.0),
+            WoodNode::made_up(Some(4), 261.0, 150.0),
+            WoodNode::made_up(Some(5), 290.0, 151.0),
+        ];
+        let graph = BranchGraph { nodes };
+        let mut is_stroke = vec![false; SIZE.area()];
+        assert_eq!(
+            without_walls(&graph, &is_stroke, SIZE).nodes,
+            graph.nodes[..4]
+        );
+        let drawn = SIZE.pixel_at(graph.nodes[5].position_px).expect("a pixel");
+        is_stroke[drawn] = true;
+        // What the drawn line goes on in is a wall still.
+        assert_eq!(
+            without_walls(&graph, &is_stroke, SIZE).nodes,
+            graph.nodes[..6]
+        );
+    }
+
+    /// The trunk's radius does not depend on whether the line runs in its middle.
+    #[test]
+    fn a_line_beside_the_middle_has_the_radius_of_the_middle() {
+        let mut mask = vec![0; SIZE.area()];
+        for v in 100..230 {
+            mask[v * 320 + 150..v * 320 + 171].fill(255);
+        }
+        let inside_px = ways::distances(&mask, SIZE).expect("distances");
+        for u in [151.0, 155.0, 160.0, 169.0] {
+            let line = vec![Point2::new(u, 220.0), Point2::new(u, 110.0)];
+            let radius_px = radius_low_px(&line, &inside_px, SIZE).expect("a radius");
+            assert!((radius_px - 10.5).abs() < 1.0, "{u}: {radius_px}");
+        }
     }
 
     fn seen(picture: &Rgb, strokes: &[Stroke]) -> Result<SeenInPhotograph, NotSeen> {

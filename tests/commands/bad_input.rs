@@ -780,10 +780,11 @@ fn a_reader_that_goes_away_ends_the_stream_quietly() {
     check("| head -1", &run, &output, DONE, &[], Model);
 }
 
-/// Ctrl-C in the middle: what was seen until then is a whole capture.
+/// Ctrl-C in the middle: what was seen until then is a whole capture. `timeout` signals the program and then
+/// its group: that is one end.
 #[test]
 fn a_replay_that_is_stopped_keeps_what_it_has() {
-    for signal in ["INT", "TERM"] {
+    for (signal, times) in [("INT", 1), ("TERM", 1), ("TERM", 2)] {
         let mut run = Run::new(
             "replay {f}/clip.mkv --outline {outline} --stream ndjson --config {f}/eager.toml --out out",
         );
@@ -795,10 +796,12 @@ fn a_replay_that_is_stopped_keeps_what_it_has() {
             .expect("arborcam starts");
         let mut poses = BufReader::new(child.stdout.take().expect("pipe")).lines();
         poses.next().expect("a pose").expect("a line");
-        Command::new("kill")
-            .args(["-s", signal, &child.id().to_string()])
-            .status()
-            .expect("kill");
+        for _ in 0..times {
+            Command::new("kill")
+                .args(["-s", signal, &child.id().to_string()])
+                .status()
+                .expect("kill");
+        }
         let streamed = 1 + poses.map_while(Result::ok).count() as u64;
         let output = child.wait_with_output().expect("end");
         check(signal, &run, &output, STOPPED, &[], Model);
