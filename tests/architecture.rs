@@ -254,6 +254,8 @@ const MAY_USE: &[(&str, &[&str])] = &[
             "doctor",
             // What is caught is said by a command in one line.
             "caught::print_only_uncaught",
+            // Markers off the picture are refused before anything is filmed.
+            "markers::check_places",
         ],
     ),
     ("main.rs", &["cli"]),
@@ -271,6 +273,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("kurbo::", &["import"]),
     ("las::", &["import"]),
     ("e57::", &["import"]),
+    ("crs_definitions::", &["import"]),
     ("flate2::", &["export"]),
     ("base64::", &["export"]),
     ("opencv::", &["track", "outline", "wood", "markers"]),

@@ -38,15 +38,15 @@ const TWIG_RADII_MM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 #[derive(Debug, Args)]
 pub struct CloudArgs {
     /// The points of a tree, or of several, z up (.las, .laz, .e57, .ply, .pcd, .xyz, .txt, .asc, .csv, .pts); or a
-    /// tree as a table of cylinders (.csv) or a treefile (.txt).
+    /// tree as a table of cylinders or a treefile, which are known by their first line.
     file: PathBuf,
     /// Folder for the tree, or for several trees and their scene. It must not exist, and appears
     /// when it is complete.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// How the middle lines are found.
-    #[arg(long, value_name = "HOW", default_value = "paths")]
-    method: Method,
+    /// How the middle lines are found; `paths` if not given.
+    #[arg(long, value_name = "HOW")]
+    method: Option<Method>,
     /// Unit of the file, if it is not the metre and the file does not say it.
     #[arg(long, value_name = "UNIT")]
     unit: Option<Unit>,
@@ -142,14 +142,16 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let CloudRead {
         cloud,
         units_in_file,
+        unknown_system,
     } = read(&args.file, args.unit.map(Unit::metres))?;
     print_units(units_in_file);
     let options = CloudOptions {
-        method: args.method.into(),
+        method: args.method.unwrap_or(Method::Paths).into(),
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
         in_leaf: args.in_leaf,
     };
     let found = trees_of_cloud(&cloud, options).map_err(|e| args.failed(e))?;
+    print_left_out(cloud.not_finite);
     let given = args.unit.map(|unit| Units::all(unit.metres()));
     let scan = Scan {
         name: args
@@ -160,6 +162,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
             .into_owned(),
         units: given.or(units_in_file).unwrap_or(Units::METRES),
         unit_is_known: given.or(units_in_file).is_some(),
+        unknown_system,
         cloud,
         config,
     };
@@ -198,6 +201,8 @@ struct Scan {
     /// Of the file.
     units: Units,
     unit_is_known: bool,
+    /// The EPSG number of its coordinate system, where nothing says the unit of that.
+    unknown_system: Option<u64>,
     config: Config,
 }
 
@@ -214,10 +219,16 @@ impl Scan {
         if self.unit_is_known {
             return;
         }
-        let word = if height_m > TALL_M { "warning" } else { "note" };
+        let (word, why) = match self.unknown_system {
+            Some(code) => (
+                "warning",
+                format!("the unit of the file's coordinate system, EPSG:{code}, is not known"),
+            ),
+            None if height_m > TALL_M => ("warning", "no unit in the file".to_owned()),
+            None => ("note", "no unit in the file".to_owned()),
+        };
         eprint_line(&format!(
-            "arborcam: {word}: no unit in the file: taken as metres, {which} is {height_m:.1} m high; give --unit if \
-             that is wrong"
+            "arborcam: {word}: {why}: taken as metres, {which} is {height_m:.1} m high; give --unit if that is wrong"
         ));
     }
 
@@ -370,13 +381,15 @@ fn lies_on(fit: &FilmFit) -> String {
 /// # Errors
 /// The file cannot be opened, or holds no points that can be read.
 fn read(path: &Path, unit_m: Option<f64>) -> Result<CloudRead, CommandError> {
+    if path.is_dir() {
+        return Err(CommandError::NoInput(anyhow!(
+            "cannot read {}: it is a folder; give a file of points",
+            path.display()
+        )));
+    }
     let format = CloudFormat::of_name(path).with_context(|| path.display().to_string());
     let format = format.map_err(CommandError::BadUsage)?;
-    let file = File::open(path).and_then(|file| match file.metadata()?.is_dir() {
-        true => Err(std::io::ErrorKind::IsADirectory.into()),
-        false => Ok(file),
-    });
-    let file = file.map_err(|e| {
+    let file = File::open(path).map_err(|e| {
         CommandError::NoInput(anyhow!("cannot read {}: {e}; give another", path.display()))
     })?;
     read_cloud(BufReader::new(file), format, unit_m).map_err(|e| match e {
@@ -398,6 +411,19 @@ fn print_units(units: Option<Units>) {
     eprint_line(&format!(
         "arborcam: note: the file's unit is {along_m:.4} m{heights}, as its coordinate system says"
     ));
+}
+
+/// A word on points that were left out as they are no places.
+fn print_left_out(not_finite: usize) {
+    if not_finite > 0 {
+        let (points, their) = match not_finite {
+            1 => ("point is", "its"),
+            _ => ("points are", "their"),
+        };
+        eprint_line(&format!(
+            "arborcam: note: {not_finite} {points} left out: not all of {their} coordinates are numbers"
+        ));
+    }
 }
 
 fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {

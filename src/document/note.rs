@@ -130,6 +130,9 @@ pub struct ScanNote {
     pub ground_points: u64,
     pub noise_points: u64,
     pub apart_points: u64,
+    /// Points of the file that were left out, as not all of their coordinates are numbers; not among `points`.
+    #[serde(default)]
+    pub not_finite_points: u64,
     /// Points of leaves, where they were taken off.
     #[serde(default)]
     pub leaf_points: u64,

@@ -5,9 +5,13 @@
 use super::error::ImportError;
 use super::model_tree::{Edges, from_z_up};
 use super::segments::{self, Segment};
+use super::wood_table::{number, separator_of};
 use crate::model::SwayColumns;
 use csv::StringRecord;
 use nalgebra::Point3;
+
+/// What some programs write before the text.
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// The columns of one of the tools.
 struct Table {
@@ -52,6 +56,7 @@ struct Columns {
     radius: Option<usize>,
     sway: [Option<usize>; SwayColumns::NAMES.len()],
     is_z_up: bool,
+    separator: char,
 }
 
 /// The middle lines of the cylinders with what is said of them.
@@ -59,11 +64,16 @@ struct Columns {
 /// # Errors
 /// A column is missing, a row cannot be read, or what it grows from is not in the table.
 pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
-    let mut table = csv::Reader::from_reader(bytes);
-    let columns = Columns::of(table.headers().map_err(ImportError::bad_format)?)?;
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let separator = separator_of(&String::from_utf8_lossy(bytes));
+    let mut table = csv::ReaderBuilder::new()
+        .delimiter(separator as u8)
+        .comment(Some(b'#'))
+        .from_reader(bytes);
+    let columns = Columns::of(table.headers().map_err(unreadable)?, separator)?;
     let mut rows: Vec<Segment> = Vec::new();
     for row in table.records() {
-        let row = row.map_err(ImportError::bad_format)?;
+        let row = row.map_err(unreadable)?;
         rows.push(columns.segment(&row).ok_or_else(|| {
             let line = row.position().map_or(0, csv::Position::line);
             ImportError::bad_format(format!("line {line} holds what is no number"))
@@ -78,9 +88,23 @@ pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
     segments::edges(rows)
 }
 
+/// What is wrong with a row.
+fn unreadable(e: csv::Error) -> ImportError {
+    let line = e.position().map_or(1, csv::Position::line);
+    match e.kind() {
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => ImportError::bad_format(format!(
+            "line {line} has {len} cells, and the first line {expected_len}"
+        )),
+        csv::ErrorKind::Utf8 { .. } => ImportError::bad_format("it is no text"),
+        _ => ImportError::bad_format(format!("line {line} cannot be read")),
+    }
+}
+
 impl Columns {
     /// Where those of one of the tools are.
-    fn of(header: &StringRecord) -> Result<Self, ImportError> {
+    fn of(header: &StringRecord, separator: char) -> Result<Self, ImportError> {
         let place = |name: &str| header.iter().position(|h| h.trim() == name);
         for table in [OURS, SIMPLE_FOREST, ARCHI] {
             let found = table.columns.map(place);
@@ -90,6 +114,7 @@ impl Columns {
                     radius: place(table.radius),
                     sway: SwayColumns::NAMES.map(place),
                     is_z_up: table.is_z_up,
+                    separator,
                 });
             }
         }
@@ -112,29 +137,29 @@ impl Columns {
     fn segment(&self, row: &StringRecord) -> Option<Segment> {
         let mut cells = [0.0; OURS.columns.len()];
         for (cell, column) in cells.iter_mut().zip(self.places) {
-            *cell = row.get(column)?.trim().parse().ok()?;
+            *cell = number(row.get(column)?, self.separator)?;
         }
         let [id, parent, x, y, z, to_x, to_y, to_z] = cells;
         let mut sway = [f64::NAN; SwayColumns::NAMES.len()];
         for (cell, column) in sway.iter_mut().zip(self.sway) {
-            *cell = known(row, column)?;
+            *cell = self.known(row, column)?;
         }
         Some(Segment {
             id: segments::id(id)?,
             parent: Some(segments::id(parent)?),
             start: Some(self.place([x, y, z])),
             end: self.place([to_x, to_y, to_z]),
-            wood: segments::wood(known(row, self.radius)?, sway),
+            wood: segments::wood(self.known(row, self.radius)?, sway),
         })
     }
-}
 
-/// The number in a cell, which is no number where the cell is empty or there is no such column;
-/// `None` where it holds something else.
-fn known(row: &StringRecord, column: Option<usize>) -> Option<f64> {
-    match column.and_then(|column| row.get(column)).map(str::trim) {
-        None | Some("" | "NA") => Some(f64::NAN),
-        Some(cell) => cell.parse().ok(),
+    /// The number in a cell, which is no number where the cell is empty or there is no such column;
+    /// `None` where it holds something else.
+    fn known(&self, row: &StringRecord, column: Option<usize>) -> Option<f64> {
+        match column.and_then(|column| row.get(column)).map(str::trim) {
+            None | Some("" | "NA") => Some(f64::NAN),
+            Some(cell) => number(cell, self.separator),
+        }
     }
 }
 
@@ -161,6 +186,19 @@ mod tests {
             .replace("\n2,1", "\n1,0")
             .replace("\n1,0,0,0,0,0", "\n0,-1,0,0,0,0");
         assert_eq!(edges(with_minus.as_bytes()), Ok(archi));
+        for separator in [";", "\t"] {
+            let other = table.replace(',', separator);
+            assert_eq!(edges(other.as_bytes()), Ok(file.clone()), "{other}");
+        }
+        let decimal_commas = table.replace(',', ";").replace('.', ",");
+        assert_eq!(edges(decimal_commas.as_bytes()), Ok(file.clone()));
+        let short = edges(format!("{table}3,1,0\n").as_bytes()).expect_err("cells are missing");
+        assert!(
+            short
+                .to_string()
+                .contains("line 4 has 3 cells, and the first line 9"),
+            "{short}"
+        );
         for bad in [
             "",
             "ID,parentID\n1,0\n",

@@ -34,6 +34,7 @@ mod svg_path;
 mod svg_place;
 mod traced;
 mod treefile;
+mod wood_table;
 
 pub use cloud::{CloudFormat, CloudRead, Units, read_cloud};
 pub use error::ImportError;

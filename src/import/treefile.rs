@@ -6,6 +6,7 @@ use super::error::ImportError;
 use super::model_tree::{Edges, MOST_PLACES, from_z_up};
 use super::segments::{self, Segment};
 use super::sketch::refuse_more;
+use super::wood_table;
 use crate::model::SwayColumns;
 
 /// What a header says on a line: how many numbers there are of the tree and of each segment, and
@@ -18,6 +19,7 @@ struct Columns {
     /// `None` where there is no such column.
     radius: Option<usize>,
     sway: [Option<usize>; SwayColumns::NAMES.len()],
+    separator: char,
 }
 
 /// The ways from each segment's parent to it, turned so that y is up.
@@ -26,10 +28,11 @@ struct Columns {
 /// The header names no `x`, `y`, `z` and `parent_id`, a line cannot be read, there are several trees,
 /// or a parent is not in it.
 pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
+    let text = text.trim_start_matches('\u{feff}');
     let lines = (1..).zip(text.lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let header = lines.next().map_or("", |(_, line)| line);
-    let columns = Columns::of(header).ok_or_else(|| {
+    let columns = Columns::of(header, wood_table::separator_of(text)).ok_or_else(|| {
         ImportError::bad_format("its header has no x, y, z and parent_id, and it is no treefile")
     })?;
     let (number, line) = lines.next().ok_or(ImportError::NoSkeleton)?;
@@ -43,7 +46,7 @@ pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
     }
     refuse_more(
         "segments",
-        line.matches(',').count() / columns.of_segment,
+        line.matches(columns.separator).count() / columns.of_segment,
         MOST_PLACES,
     )?;
     let segments = columns.segments(line).ok_or_else(|| {
@@ -57,14 +60,15 @@ fn known(row: &[f64], column: Option<usize>) -> f64 {
     column.map_or(f64::NAN, |column| row[column])
 }
 
-/// The cells of a line; one behind the last comma may be empty.
-fn cells(line: &str) -> impl Iterator<Item = &str> {
-    line.trim().trim_end_matches(',').split(',').map(str::trim)
+/// The cells of a line; one behind the last separator may be empty.
+fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
+    let line = line.trim().trim_end_matches(separator);
+    line.split(separator).map(str::trim)
 }
 
 impl Columns {
-    fn of(header: &str) -> Option<Self> {
-        let names: Vec<&str> = cells(header).collect();
+    fn of(header: &str, separator: char) -> Option<Self> {
+        let names: Vec<&str> = cells(header, separator).collect();
         let of_tree = names.iter().position(|name| *name == "x")?;
         let segment = &names[of_tree..];
         let column = |name: &str| segment.iter().position(|n| *n == name);
@@ -75,14 +79,15 @@ impl Columns {
             parent: column("parent_id")?,
             radius: column("radius"),
             sway: SwayColumns::NAMES.map(column),
+            separator,
         })
     }
 
     /// Of the line of one tree; `None` where it cannot be read.
     fn segments(&self, line: &str) -> Option<Vec<Segment>> {
         let mut numbers: Vec<f64> = Vec::new();
-        for cell in cells(line) {
-            numbers.push(cell.parse().ok()?);
+        for cell in cells(line, self.separator) {
+            numbers.push(wood_table::number(cell, self.separator)?);
         }
         let rows = numbers.get(self.of_tree..)?.chunks_exact(self.of_segment);
         if rows.len() == 0 || !rows.remainder().is_empty() {
@@ -124,6 +129,14 @@ mod tests {
                 .iter()
                 .all(|w| w.radius == 0.1 && w.sway.is_none())
         );
+    }
+
+    #[test]
+    fn semicolons_and_tabs_part_cells_too() {
+        let file = edges(FORK).expect("sound");
+        for separator in [";", "\t"] {
+            assert_eq!(edges(&FORK.replace(',', separator)), Ok(file.clone()));
+        }
     }
 
     /// Parents may stand behind what grows from them.

@@ -142,6 +142,7 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         noise_points: figures.noise as u64,
         leaf_points: figures.leaves as u64,
         apart_points: figures.apart as u64,
+        not_finite_points: cloud.not_finite as u64,
         cell_m: figures.cell_m,
         noise_m: figures.noise_m,
         twig_radius_m: figures.twig_radius_m,

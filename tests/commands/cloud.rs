@@ -220,6 +220,23 @@ fn a_table_of_cylinders_is_a_tree_as_that_of_a_scan() {
     let swaying = tree.sway.iter().flatten();
     let hz: Vec<f64> = swaying.map(|sway| sway.frequency_hz.value).collect();
     assert_eq!(hz, [0.8]);
+    // What parts its cells, and its name, may be others.
+    for (name, text) in [
+        ("tabs.csv", rows.replace(',', "\t")),
+        ("semicolons.txt", rows.replace(',', ";")),
+        ("table.xyz", rows.clone()),
+    ] {
+        let [other, folder] = [name.to_owned(), format!("{name}-tree")].map(|n| dir.path().join(n));
+        fs::write(&other, text).expect("table");
+        let options = ["cloud", other.to_str().expect("name"), "--method", "paths"];
+        let said = done(&options, &folder);
+        assert!(
+            said.contains("note: --method changes nothing here"),
+            "{said}"
+        );
+        let [a, b] = [&out, &folder].map(|dir| fs::read(dir.join("nodes.csv")).expect("nodes"));
+        assert!(a == b, "{name}");
+    }
     let shown = out.to_str().expect("name");
     let said = done(&["export", shown, "--format", "qsm"], &again);
     for (order, [length, thick]) in [[5.0, 0.2], [2.12, 0.08]].into_iter().enumerate() {
@@ -269,6 +286,10 @@ fn tables_of_cylinders_stand_in_the_scan_and_are_read_again() {
         assert!(said.contains("order 0: 1 branches, length 5."), "{said}");
         let bytes = fs::read(&path).expect("file");
         trees.push(read_model(&bytes, &path).expect("a tree").tree);
+        // By what it holds, not by its name.
+        let other = path.with_extension(if format == "qsm" { "txt" } else { "csv" });
+        let renamed = read_model(&bytes, &other).expect("a tree").tree;
+        assert_eq!(trees.last(), Some(&renamed), "{format}");
     }
     let [table, treefile] = &trees[..] else {
         panic!("two trees");
@@ -420,12 +441,82 @@ fn units_are_taken_as_given() {
         .expect("a number");
     assert!((4.9..5.1).contains(&height), "{said}");
     assert!(!said.contains("no unit"), "{said}");
-    // Without a word on it the feet are metres, and the note says how high the tree is then.
+    assert!(!said.contains("left out"), "{said}");
+    // Without a word on it the feet are metres, and the note says how high the tree is then. What is no place
+    // is counted.
+    let mut text = fs::read_to_string(&feet).expect("cloud");
+    text += "nan 1 2\n1 inf 2\n1 2 nan\n";
+    fs::write(&feet, text).expect("cloud");
     let out = dir.path().join("other");
     let said = done(&["cloud", feet.to_str().expect("name")], &out);
     let note = "note: no unit in the file: taken as metres, the tree is 16.";
     assert!(said.contains(note), "{said}");
     assert!(said.contains("give --unit if that is wrong"), "{said}");
+    assert!(said.contains("3 points are left out"), "{said}");
+    let scan = Document::note(&out).expect("a note").scan.expect("a scan");
+    assert_eq!(scan.not_finite_points, 3);
+}
+
+/// A LAS file of these points in metres, written in US survey feet, whose coordinate system has this number in
+/// the EPSG register; nothing else in it says the unit.
+fn write_las(path: &Path, points: &[Point3<f64>], code: u16) {
+    const US_FOOT_M: f64 = 1200.0 / 3937.0;
+    let mut builder = las::Builder::from((1, 2));
+    let scale = las::Transform {
+        scale: 0.001,
+        offset: 0.0,
+    };
+    builder.transforms = las::Vector {
+        x: scale,
+        y: scale,
+        z: scale,
+    };
+    let keys: [u16; 12] = [1, 1, 0, 2, 1024, 0, 1, 1, 3072, 0, 1, code];
+    builder.vlrs.push(las::Vlr {
+        user_id: "LASF_Projection".to_owned(),
+        record_id: 34735,
+        description: String::new(),
+        data: keys.iter().flat_map(|key| key.to_le_bytes()).collect(),
+    });
+    let header = builder.into_header().expect("header");
+    let mut writer = las::Writer::from_path(path, header).expect("writer");
+    for point in points {
+        let at = point / US_FOOT_M;
+        let point = las::Point {
+            x: at.x,
+            y: at.y,
+            z: at.z,
+            ..las::Point::default()
+        };
+        writer.write_point(point).expect("point");
+    }
+    writer.close().expect("written");
+}
+
+#[test]
+fn the_number_of_a_coordinate_system_says_the_unit() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let points = points_on(&TUBES, 0.012, 0.003, &mut Chance::new(7));
+    let path = |name: &str| dir.path().join(name);
+    // Without ground the foot is where the lowest points are: 4.76 m.
+    // New York Long Island.
+    write_las(&path("known.las"), &points, 2263);
+    let known = path("known.las");
+    let said = done(&["cloud", known.to_str().expect("name")], &path("known"));
+    assert!(said.contains("the file's unit is 0.3048 m"), "{said}");
+    assert!(said.contains(", 4.7") && said.contains(" m high"), "{said}");
+    // One that the definitions do not have: said, and not taken for metres in silence.
+    write_las(&path("unknown.las"), &points, 20050);
+    let unknown = path("unknown.las");
+    let name = unknown.to_str().expect("name");
+    let said = done(&["cloud", name], &path("unknown"));
+    let warning = "warning: the unit of the file's coordinate system, EPSG:20050, is not known: taken as metres";
+    assert!(
+        said.contains(warning) && said.contains("give --unit"),
+        "{said}"
+    );
+    let said = done(&["cloud", name, "--unit", "us-ft"], &path("given"));
+    assert!(!said.contains("EPSG") && said.contains(", 4.7"), "{said}");
 }
 
 /// Trees on a slope, not far from each other, each turned and of another size.
@@ -558,6 +649,10 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
     fs::write(path("comma.xyz"), "1,5;2,5;3,5\n".repeat(500)).expect("file");
     fs::write(path("words.txt"), "a tree\n".repeat(50)).expect("file");
     fs::write(path("empty.las"), "").expect("file");
+    fs::write(path("words.las"), "a tree and many words ".repeat(50)).expect("file");
+    fs::create_dir(path("folder.las")).expect("folder");
+    let cut = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius\n1,0,0\n";
+    fs::write(path("cut.csv"), cut).expect("file");
     fs::write(path("short.las"), b"LASF and nothing more").expect("file");
     fs::write(
         path("more.ply"),
@@ -577,9 +672,17 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
         ("words.txt", FAILED, "line 17"),
         ("empty.las", FAILED, "cut off"),
         ("short.las", FAILED, "cut off"),
+        ("words.las", FAILED, "it does not begin as LAS does"),
+        ("folder.las", NO_INPUT, "it is a folder"),
+        (
+            "cut.csv",
+            FAILED,
+            "line 2 has 3 cells, and the first line 9",
+        ),
         ("more.ply", FAILED, "more than its header says"),
         ("tree.mov", BAD_USAGE, "its name does not say"),
         ("absent.ply", NO_INPUT, "cannot read"),
+        ("absent.csv", NO_INPUT, "there is no such file"),
     ] {
         let out = path("out");
         let output = arborcam(&["cloud", path(name).to_str().expect("name")], &out);

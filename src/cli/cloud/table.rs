@@ -8,7 +8,7 @@ use crate::cli::stop::Stop;
 use crate::cli::unused;
 use crate::config::Config;
 use crate::document::Document;
-use crate::import::{ModelTree, Units, is_wood_table, read_model};
+use crate::import::{CloudFormat, ModelTree, Units, is_wood_table, read_model};
 use crate::model::{PointCloud, Skeleton, Swaying, Unidentified};
 use crate::pipeline::as_scanned;
 use std::fs::File;
@@ -23,11 +23,7 @@ const BEGIN: u64 = 65_536;
 /// # Errors
 /// It is one, and cannot be read.
 pub fn read(path: &Path) -> Result<Option<ModelTree>, CommandError> {
-    let ending = path.extension().unwrap_or_default();
-    if !["csv", "txt"]
-        .iter()
-        .any(|e| ending.eq_ignore_ascii_case(e))
-    {
+    if !matches!(CloudFormat::of_name(path), Ok(CloudFormat::Text) | Err(_)) {
         return Ok(None);
     }
     let mut begin = Vec::new();
@@ -52,6 +48,7 @@ pub fn write(
     stop: &Stop,
 ) -> Result<(), CommandError> {
     for (is_given, option) in [
+        (args.method.is_some(), "--method"),
         (args.points, "--points"),
         (args.in_leaf, "--in-leaf"),
         (args.tree.is_some(), "--tree"),
@@ -76,6 +73,7 @@ pub fn write(
             .unit
             .map_or(Units::METRES, |unit| Units::all(unit.metres())),
         unit_is_known: args.unit.is_some(),
+        unknown_system: None,
         config,
     };
     let mut drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;

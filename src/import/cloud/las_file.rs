@@ -1,6 +1,6 @@
 //! LAS and LAZ.
 
-use super::las_units::units_of;
+use super::las_units::{Said, units_of};
 use super::laz_chunks::{ChunkedFile, end_of_chunks};
 use super::{Points, refuse_many};
 use crate::caught::caught;
@@ -8,6 +8,8 @@ use crate::import::error::ImportError;
 use las::Reader;
 use std::io::{BufRead, Read, Seek, SeekFrom};
 
+/// Every file begins with this.
+const BEGIN: &[u8] = b"LASF";
 /// A byte holds no more compressed points than that: equal points take an eighth of a bit each.
 const MOST_POINTS_OF_BYTE: u64 = 64;
 /// Points that are read at a time, and their bytes: a header may say that each point has 65,535.
@@ -36,6 +38,7 @@ pub(super) fn read<R>(mut input: R, points: &mut Points) -> Result<(), ImportErr
 where
     R: BufRead + Seek + Send + Sync + 'static,
 {
+    check_begin(&mut input)?;
     let size = check_lengths(&mut input).map_err(|e| ImportError::unreadable(&e))?;
     // The decompressor panics on some damaged files.
     let read = caught(move || {
@@ -49,6 +52,17 @@ where
         done
     });
     read.unwrap_or_else(|| Err(ImportError::bad_format("its compressed points are damaged")))
+}
+
+/// Refuses what is something else. What is shorter is cut off, which is told later.
+fn check_begin(input: &mut (impl Read + Seek)) -> Result<(), ImportError> {
+    let mut begin = Vec::new();
+    let read = input.take(BEGIN.len() as u64).read_to_end(&mut begin);
+    read.map_err(|e| ImportError::unreadable(&e))?;
+    if begin.len() == BEGIN.len() && begin != BEGIN {
+        return Err(ImportError::bad_format("it does not begin as LAS does"));
+    }
+    Ok(())
 }
 
 /// What is read at once, be it as long as it says, is not longer than the file. Returns the size of
@@ -132,9 +146,13 @@ where
     let records = reader.header().all_vlrs();
     if !points.unit_is_given {
         for record in records {
-            if let Some(units) = units_of(record.record_id, &record.data)? {
-                points.take_units(units);
-                break;
+            match units_of(record.record_id, &record.data)? {
+                Said::Units(units) => {
+                    points.take_units(units);
+                    break;
+                }
+                Said::UnknownSystem(code) => points.read.unknown_system = Some(code),
+                Said::Nothing => {}
             }
         }
     }

@@ -1,6 +1,7 @@
 //! Point clouds in the files of scanners: LAS, LAZ, E57, PLY, PCD, and text.
 
 mod e57_file;
+mod epsg;
 mod las_file;
 mod las_units;
 mod laz_chunks;
@@ -54,6 +55,8 @@ pub struct CloudRead {
     pub cloud: PointCloud,
     /// The units that the file's own coordinate system names; looked for where none was given.
     pub units_in_file: Option<Units>,
+    /// The EPSG number of the file's coordinate system, where nothing says the unit of that.
+    pub unknown_system: Option<u64>,
 }
 
 /// The units of coordinates.
@@ -123,6 +126,7 @@ impl Points {
     /// Takes the units that the file names.
     fn take_units(&mut self, units: Units) {
         self.read.units_in_file = Some(units);
+        self.read.unknown_system = None;
         self.units = units;
     }
 
