@@ -2,10 +2,11 @@
 
 use super::command_error::CommandError;
 use super::common::parse_within;
+use super::unused;
 use crate::config;
 use crate::import::read_lens_profile;
 use crate::model::{Distortion, Pinhole, Size};
-use crate::source::CameraFile;
+use crate::source::{CameraFile, SourceInfo};
 use anyhow::anyhow;
 use clap::Args;
 use std::path::Path;
@@ -36,7 +37,7 @@ fn unit(text: &str) -> Result<f64, String> {
     parse_within(
         text.trim().trim_end_matches('m'),
         LEAST_UNIT_M..=LARGEST_UNIT_M,
-        "give the metres of one count, like 0.001",
+        "give the metres of one count, 0.000001 to 1, like 0.001",
     )
 }
 
@@ -77,6 +78,21 @@ impl DepthArgs {
             depth.unit_m = file.unit_m.unwrap_or(depth.unit_m);
         }
         depth.unit_m = self.depth_unit.unwrap_or(depth.unit_m);
+    }
+
+    /// Notes the options that change nothing, as the film of this source has no depth.
+    pub fn note_unused(&self, film: &SourceInfo) {
+        if film.live || film.depth.is_some() {
+            return;
+        }
+        for (is_given, option) in [
+            (self.depth_unit.is_some(), "--depth-unit"),
+            (self.depth_camera.is_some(), "--depth-camera"),
+        ] {
+            if is_given {
+                unused::note(option, "the film has no depth");
+            }
+        }
     }
 
     /// Checks that the camera is for pictures of this size.

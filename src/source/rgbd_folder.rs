@@ -10,6 +10,7 @@ use super::images::picture;
 use super::interface::{Source, SourceInfo};
 use crate::config;
 use crate::model::{DEPTH_APART_S, DepthImage, FormatNote, RawFrame, Size, nanoseconds, seconds};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -39,7 +40,13 @@ pub(super) struct RgbdFolder {
     next: usize,
     size: Size,
     tally: DepthTally,
+    /// What is to be told at once.
+    news: Vec<String>,
 }
+
+/// What may be done about a depth image that cannot be used.
+const INSTEAD: &str = "put a sound one there, take its line out of depth.txt, or give --no-depth for the colours \
+                       alone";
 
 /// A line of a list.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,9 +76,15 @@ impl RgbdFolder {
             next: 0,
             size,
             tally: DepthTally::default(),
+            news: Vec::new(),
         };
         if settings.read && folder.join(DEPTHS).is_file() {
             it.take_depth(settings)?;
+        } else if settings.read {
+            it.news.push(format!(
+                "{}: there is no depth.txt beside rgb.txt, and so no depth: the colours are used alone",
+                folder.display()
+            ));
         }
         Ok(it)
     }
@@ -96,7 +109,8 @@ impl RgbdFolder {
                 ),
             ));
         };
-        let image = read_depth(first).map_err(|what| SourceError::bad_format(first, what))?;
+        let image = read_depth(first)
+            .map_err(|why| SourceError::bad_format(first, format!("{why}; {INSTEAD}")))?;
         let known = self
             .said(settings)?
             .known(&self.folder, settings, self.size)?;
@@ -195,10 +209,11 @@ impl Source for RgbdFolder {
     }
 
     fn warnings(&mut self) -> Vec<String> {
-        if self.next < self.frames.len() {
-            return Vec::new();
+        let mut lines = std::mem::take(&mut self.news);
+        if self.next == self.frames.len() {
+            lines.extend(self.tally.take_warnings(&self.folder.display().to_string()));
         }
-        self.tally.take_warnings(&self.folder.display().to_string())
+        lines
     }
 }
 
@@ -214,7 +229,12 @@ fn read_picture(file: &Path) -> Result<(Size, crate::model::PixelFormat, Vec<u8>
 
 /// A depth image from its file, or why it is none.
 fn read_depth(file: &Path) -> Result<DepthImage, String> {
-    let bytes = std::fs::read(file).map_err(|e| e.to_string())?;
+    let bytes = std::fs::read(file).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => "there is no such file".to_owned(),
+        ErrorKind::IsADirectory => "it is a folder".to_owned(),
+        ErrorKind::PermissionDenied => "reading it is not allowed".to_owned(),
+        _ => format!("reading it fails ({e})"),
+    })?;
     depth_of_png(&bytes)
 }
 
@@ -228,16 +248,16 @@ pub(super) fn depth_of_png(bytes: &[u8]) -> Result<DepthImage, String> {
     reader.limits(limits);
     let image = reader
         .decode()
-        .map_err(|e| format!("it is no readable PNG ({e})"))?;
+        .map_err(|_| "it is no readable PNG".to_owned())?;
     match image {
         image::DynamicImage::ImageLuma16(image) => Ok(DepthImage {
             size: Size::new(image.width(), image.height()),
             counts: image.into_raw(),
         }),
-        other => Err(format!(
-            "it has {:?} pixels; depth is a PNG with 16 bits of grey",
-            other.color()
-        )),
+        image::DynamicImage::ImageLuma8(_) => {
+            Err("it has 8 bits of grey, and depth is a PNG with 16 bits of grey".to_owned())
+        }
+        _ => Err("it is in colour, and depth is a PNG with 16 bits of grey".to_owned()),
     }
 }
 

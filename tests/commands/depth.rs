@@ -241,4 +241,18 @@ fn what_is_missing_is_said_in_one_line() {
     );
     fs::write(film.path("depth/0.png"), "no picture").expect("written");
     refused(&[], NO_INPUT, "it is no readable PNG");
+    fs::remove_file(film.path("depth/0.png")).expect("removed");
+    let missing = "depth/0.png cannot be used: there is no such file; put a sound one there, take its line out of \
+                   depth.txt, or give --no-depth";
+    refused(&[], NO_INPUT, missing);
+    // Without a list of them there is no depth, which is said.
+    fs::remove_file(film.path("depth.txt")).expect("removed");
+    let colours = film.replay(".", "colours", &["--depth-unit", "0.001"]);
+    is_done(&colours);
+    let said = said(&colours);
+    assert!(
+        said.contains("there is no depth.txt beside rgb.txt"),
+        "{said}"
+    );
+    assert!(said.contains("--depth-unit changes nothing here"), "{said}");
 }
