@@ -2,15 +2,16 @@
 
 use super::command_error::CommandError;
 use super::common::parse_within;
-use crate::config::{Config, MarkerCorrection, MarkerWindow};
+use crate::config::{Config, MarkerCorrection, MarkerWindow, Markers};
+use crate::markers::check_places;
 use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
 use serde::Deserialize;
 
 /// Smallest and largest plausible side of a tag, m.
-const LEAST_TAG_M: f64 = 0.001;
-const MAX_TAG_M: f64 = 100.0;
+const LEAST_TAG_M: f64 = 0.005;
+const MAX_TAG_M: f64 = 5.0;
 
 /// Marker options of `capture` and `replay`.
 #[derive(Clone, Debug, Default, Args)]
@@ -31,7 +32,7 @@ fn side(text: &str) -> Result<f64, String> {
     parse_within(
         text.trim().trim_end_matches('m'),
         LEAST_TAG_M..=MAX_TAG_M,
-        "give the side of the black square in metres, like 0.165",
+        "give the side of the black square in metres, 0.005 to 5, like 0.165",
     )
 }
 
@@ -67,6 +68,16 @@ impl MarkerArgs {
             _ => Ok(()),
         }
     }
+}
+
+/// Checks that the markers of these settings, from `--markers` or from a file of settings, lie in pictures of
+/// this size.
+///
+/// # Errors
+/// One does not.
+pub fn check_in_picture(markers: &Markers, size: Size) -> Result<(), CommandError> {
+    check_places(&markers.windows, &markers.corrections, size)
+        .map_err(|e| CommandError::BadUsage(anyhow!("--markers: {e}")))
 }
 
 /// Where the markers come from.

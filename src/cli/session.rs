@@ -4,6 +4,7 @@ use super::camera::{CameraArgs, check_depth};
 use super::command_error::CommandError;
 use super::common::Common;
 use super::hangup::{Reload, SighupAction};
+use super::markers;
 use super::output::eprint_line;
 use super::recording::{self, RecordOption};
 use super::service::Service;
@@ -80,7 +81,9 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let messages = last_messages(&running, headless);
     let (summary, failure) = running.join();
     watched?;
-    for line in messages {
+    // Markers that cannot be followed end a run in its first frame: there is nothing else to be told of it.
+    let is_refused = matches!(failure, Some(Failure::Markers(_)));
+    for line in messages.iter().filter(|_| !is_refused) {
         eprint_line(&format!("arborcam: {line}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
@@ -129,7 +132,9 @@ fn job(
     common.scale.check_size(info.size)?;
     common.strokes.check_size(info.size)?;
     common.markers.check_size(info.size)?;
+    markers::check_in_picture(&config.markers, info.size)?;
     common.depth.check_size(info.size)?;
+    common.depth.note_unused(&info);
     let outline = match &common.outline {
         OutlineSpec::Auto => None,
         OutlineSpec::File(path) => {
@@ -204,7 +209,8 @@ fn report(
     failure: Option<Failure>,
     stopped: bool,
 ) -> Result<(), CommandError> {
-    if let Some(s) = summary {
+    let is_refused = matches!(failure, Some(Failure::Markers(_)));
+    if let Some(s) = summary.filter(|_| !is_refused) {
         for line in closing_lines(s) {
             eprint_line(&line);
         }

@@ -122,7 +122,7 @@ settings! {
     /// A printed square beside the trunk (AprilTag 36h11), which gives the scale. See docs/markers.md.
     tag: Tag, SCALE {
         /// Side of its black square, m; `--tag` sets it.
-        size_m: f64 [0 ("none") to 100] = 0.0;
+        size_m: f64 [0 ("none") to 5] = 0.0;
         /// Angle that the longer side of the picture spans, degrees. Give it if it is known, above all for a
         /// lens that zooms: a tag off the middle gives the scale more sharply then.
         field_of_view_deg: f64 [0 ("unknown") to 170] = 0.0;

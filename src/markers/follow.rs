@@ -6,6 +6,7 @@ use super::claims;
 use super::error::{MarkerError, MarkerEvent};
 use super::hue::{Blob, Hsv, hues_elsewhere};
 use super::marker::{Marker, Sighting};
+use super::places::check_places;
 use super::search::{candidates, settled};
 use super::way::Way;
 use crate::config::{MAX_MARKERS, MarkerWindow, Markers};
@@ -79,15 +80,7 @@ impl MarkerTracker {
         for window in windows {
             tracker.add(&hsv, window, &elsewhere, time_s)?;
         }
-        for correction in &settings.corrections {
-            if !hsv.size.contains(correction.at_px.into()) {
-                return Err(MarkerError::CorrectionOffPicture {
-                    name: correction.marker.clone(),
-                    frame: correction.frame,
-                    size: hsv.size,
-                });
-            }
-        }
+        check_places(&[], &settings.corrections, hsv.size)?;
         Ok(tracker)
     }
 

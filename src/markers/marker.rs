@@ -3,6 +3,7 @@
 use super::area::PixelArea;
 use super::error::{MarkerError, MarkerEvent};
 use super::hue::{Blob, Hsv, HueModel};
+use super::places::check_window;
 use super::search::settled;
 use super::way::Way;
 use crate::config::{MarkerWindow, Markers};
@@ -50,12 +51,7 @@ impl Marker {
         settings: &Markers,
     ) -> Result<Self, MarkerError> {
         let window = PixelArea::of_window(&given);
-        if !hsv.size.contains(window.middle_px()) {
-            return Err(MarkerError::OffPicture {
-                name: given.name,
-                size: hsv.size,
-            });
-        }
+        check_window(&given, hsv.size)?;
         let Some(hue) = HueModel::of(hsv, &window, elsewhere, settings)? else {
             return Err(MarkerError::Grey { name: given.name });
         };

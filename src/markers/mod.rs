@@ -13,9 +13,11 @@ mod error;
 mod follow;
 mod hue;
 mod marker;
+mod places;
 mod search;
 mod shift;
 mod way;
 
 pub use error::{MarkerError, MarkerEvent};
 pub use follow::{MarkerPlace, MarkerTracker, NoScene, Scene};
+pub use places::check_places;

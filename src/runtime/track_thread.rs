@@ -59,6 +59,8 @@ pub struct TrackThread<'a> {
     shared: &'a Shared,
     last_damage: Option<DecodeError>,
     picture: FirstPicture,
+    /// The markers cannot be followed: nothing more is to be made of what was filmed.
+    is_refused: bool,
 }
 
 impl<'a> TrackThread<'a> {
@@ -77,6 +79,7 @@ impl<'a> TrackThread<'a> {
             shared,
             last_damage: None,
             picture: FirstPicture::default(),
+            is_refused: false,
         }
     }
 
@@ -103,6 +106,9 @@ impl<'a> TrackThread<'a> {
             if !alive {
                 break;
             }
+        }
+        if self.is_refused {
+            return;
         }
         for followed in self.front.flush() {
             if !self.pass_on_followed(followed) {
@@ -191,6 +197,7 @@ impl<'a> TrackThread<'a> {
         self.report_markers();
         if let Some(e) = self.front.take_marker_error() {
             self.shared.abort(Failure::Markers(e));
+            self.is_refused = true;
             return false;
         }
         if let Some(progress) = self.front.searching() {

@@ -128,6 +128,7 @@ impl Scene {
         assert_eq!(output.status.code(), Some(status), "{said}");
         assert!(!self.path("refused").exists(), "{said}");
         assert!(said.contains(expected), "{said:?} lacks {expected:?}");
+        assert_eq!(said.trim_end().lines().count(), 1, "{said}");
     }
 }
 
@@ -238,8 +239,14 @@ fn bad_markers_get_a_clear_line() {
     let [a, b] = markers_px(0);
     scene.markers(&window("A", [600.0, 20.0], ""));
     scene.refused(
-        FAILED,
+        BAD_USAGE,
         "the window of marker A lies off the picture, which is 320x240",
+    );
+    let corrected = r#"], "corrections": [{"marker": "A", "frame": 2, "at_px": [20, 300]}"#;
+    scene.markers(&format!("{}{corrected}", window("A", a, "")));
+    scene.refused(
+        BAD_USAGE,
+        "the place of marker A in frame 2 lies off the picture",
     );
     scene.markers(&window("A", [40.0, 200.0], ""));
     scene.refused(FAILED, "marker A has no colour in its window");
