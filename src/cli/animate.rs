@@ -24,7 +24,7 @@ use crate::files::{refuse_taken, write_files};
 use crate::model::{NodeId, Pose};
 use crate::tui;
 use crate::views::{PreparedTree, Shot};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use live::{FilmAnimation, WindAnimation};
 use options::Kind;
 use serde_json::{Value, json};
@@ -122,10 +122,11 @@ fn prepare_tree(args: &AnimateArgs) -> Result<PreparedTree, CommandError> {
 
 /// Reads the loudness of a WAV file.
 fn read_wav(path: &Path) -> Result<Loudness, CommandError> {
-    let loudness = std::fs::read(path)
-        .context("cannot read it")
-        .and_then(|bytes| Ok(Loudness::of_wav(&bytes)?));
-    loudness.map_err(|e| CommandError::BadUsage(e.context(format!("--wav {}", path.display()))))
+    let name = path.display();
+    let bytes = std::fs::read(path).map_err(|e| {
+        CommandError::BadUsage(anyhow!("cannot read --wav {name}: {e}; give a WAV file"))
+    })?;
+    Loudness::of_wav(&bytes).map_err(|e| CommandError::BadUsage(anyhow!("--wav {name}: {e}")))
 }
 
 /// Magnifies the filmed motion. Returns the poses, and a description for the file.

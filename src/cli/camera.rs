@@ -1,6 +1,7 @@
 //! Camera options, for every command that films.
 
 use super::command_error::CommandError;
+use super::common::setting;
 use crate::config::{self, Backend};
 use crate::source::SourceInfo;
 use anyhow::anyhow;
@@ -10,9 +11,15 @@ use clap::Args;
 pub struct CameraArgs {
     #[arg(long, help = config::help("camera.accept_format"))]
     accept_format: bool,
-    #[arg(long, value_name = "S", help = config::help("camera.timeout_s"))]
+    #[arg(long, value_name = "S", value_parser = setting("camera.timeout_s"), help = config::help("camera.timeout_s"))]
     device_timeout: Option<f64>,
-    #[arg(long, value_name = "S", conflicts_with = "once", help = config::help("camera.retry_delay_s"))]
+    #[arg(
+        long,
+        value_name = "S",
+        conflicts_with = "once",
+        value_parser = setting("camera.retry_delay_s"),
+        help = config::help("camera.retry_delay_s")
+    )]
     retry_delay: Option<f64>,
     /// End when the camera is lost, instead of waiting for it to return.
     #[arg(long)]

@@ -8,12 +8,13 @@ use super::notes::NoteArgs;
 use super::scale::ScaleArgs;
 use super::shape::ShapeArgs;
 use super::strokes::StrokeArgs;
-use crate::config::{Config, ConfigError};
+use crate::config::{self, Config, ConfigError};
 use crate::outline::OutlineSpec;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 /// Arguments of `capture` and `replay`.
 #[derive(Debug, Args)]
@@ -96,6 +97,29 @@ pub fn parse_within(text: &str, range: RangeInclusive<f64>, hint: &str) -> Resul
     match text.parse() {
         Ok(number) if range.contains(&number) => Ok(number),
         _ => Err(hint.to_owned()),
+    }
+}
+
+/// A parser of the setting `key`, for an option that gives it: what is out of range is told by the option's
+/// name, and not by that of the setting.
+pub fn setting(key: &'static str) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| within_setting(text, key, "number")
+}
+
+/// The same for a setting that is a whole number.
+pub fn whole_setting(key: &'static str) -> impl Fn(&str) -> Result<u32, String> + Clone {
+    move |text| within_setting(text, key, "whole number")
+}
+
+fn within_setting<T>(text: &str, key: &str, kind: &str) -> Result<T, String>
+where
+    T: FromStr + Into<f64> + Copy,
+{
+    let range = config::range(key);
+    let allowed = range.map_or(String::new(), |range| format!(": {}", range.words));
+    match text.parse::<T>() {
+        Ok(number) if range.is_none_or(|range| range.contains(number.into())) => Ok(number),
+        _ => Err(format!("give a {kind}{allowed}")),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::export::gltf::NamedBytes;
 use crate::files::write_files;
 use crate::model::Size;
 use crate::views::{ForestOptions, ForestPlan, HeightMap, Parent};
-use anyhow::{Context, anyhow};
+use anyhow::anyhow;
 use clap::Args;
 use image::imageops::{FilterType, resize};
 use image::{ImageReader, Limits};
@@ -99,10 +99,12 @@ impl ForestArgs {
 
 /// Reads a height map. A large one is made smaller.
 fn read_heights(path: &Path) -> Result<HeightMap, CommandError> {
-    let heights = heights(path);
-    heights
-        .with_context(|| format!("--height-map {} is no picture", path.display()))
-        .map_err(CommandError::BadUsage)
+    heights(path).map_err(|e| {
+        CommandError::BadUsage(anyhow!(
+            "--height-map {} is no picture that can be read ({e}); give a PNG, JPEG or BMP in greys",
+            path.display()
+        ))
+    })
 }
 
 fn heights(path: &Path) -> anyhow::Result<HeightMap> {

@@ -23,6 +23,7 @@ mod note;
 mod notes;
 mod output;
 mod photo;
+mod plain;
 mod play;
 mod record;
 mod recording;
@@ -41,7 +42,7 @@ mod tree;
 mod unused;
 
 use crate::caught::print_only_uncaught;
-use clap::error::ErrorKind;
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use command_error::{BAD_USAGE, CommandError, FAILED, NO_INPUT, STOPPED};
 use output::eprint_line;
@@ -153,11 +154,12 @@ fn status(error: &CommandError) -> ExitCode {
 /// does not take, in one line. Help and version are such "errors" as well; they are printed as they are.
 fn print_parse_error(e: &clap::Error) -> ExitCode {
     let text = e.render().to_string();
+    let unknown = unknown_command(e);
     let text = match (e.kind(), text.split_once("\n\n")) {
         (ErrorKind::ValueValidation, Some((line, _))) => line,
         _ => &text,
     };
-    match text.strip_prefix("error: ") {
+    match unknown.as_deref().or(text.strip_prefix("error: ")) {
         Some(what) => eprint_line(&format!("arborcam: {}", what.trim_end())),
         None => drop(e.print()),
     }
@@ -166,6 +168,33 @@ fn print_parse_error(e: &clap::Error) -> ExitCode {
     } else {
         ExitCode::SUCCESS
     }
+}
+
+/// Forests are made by an option of `grow`; who looks for a command of their own writes one of these.
+const FOREST: [&str; 3] = ["forest", "forests", "forst"];
+
+/// What is said of a command that there is not; `None` for another error.
+fn unknown_command(e: &clap::Error) -> Option<String> {
+    if e.kind() != ErrorKind::InvalidSubcommand {
+        return None;
+    }
+    let Some(ContextValue::String(name)) = e.get(ContextKind::InvalidSubcommand) else {
+        return None;
+    };
+    let hint = match e.get(ContextKind::SuggestedSubcommand) {
+        _ if FOREST.contains(&name.as_str()) => {
+            "; `arborcam grow EXAMPLE --count N --forest --out DIR` makes a forest;".to_owned()
+        }
+        // The last one is the nearest.
+        Some(ContextValue::Strings(near)) => match near.last() {
+            Some(nearest) => format!("; is `{nearest}` meant?"),
+            None => ";".to_owned(),
+        },
+        _ => ";".to_owned(),
+    };
+    Some(format!(
+        "there is no command `{name}`{hint} `arborcam --help` lists all commands"
+    ))
 }
 
 /// The error in one line, followed by those of its causes that it does not quote already.

@@ -1,6 +1,7 @@
 //! Lines on standard output and standard error.
 
 use super::command_error::CommandError;
+use super::plain::plain;
 use anyhow::anyhow;
 use std::io::{ErrorKind, Write};
 
@@ -19,7 +20,7 @@ pub fn print(text: &str) -> Result<(), CommandError> {
     }
 }
 
-/// Writes a line to standard error. Errors are ignored: nobody reads it then.
+/// Writes a line to standard error, in plain words. Errors are ignored: nobody reads it then.
 pub fn eprint_line(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", plain(line));
 }

@@ -6,15 +6,17 @@ use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
 use nalgebra::Point2;
+use std::ops::RangeInclusive;
 
-/// Largest plausible size of a pixel, m.
-const MAX_METRES_PER_PX: f64 = 1e6;
+/// Plausible sizes of a pixel, m: a shrub of 0.1 m in the largest picture has 6e-6, a tree of 130 m in one of
+/// 16 px has 8.
+const METRES_PER_PX: RangeInclusive<f64> = 1e-6..=10.0;
 
 /// The options for the scale.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ScaleArgs {
     /// Size of a pixel at the tree, m; lengths are then in metres. 0: lengths are in pixels.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = pixel_size)]
     metres_per_px: Option<f64>,
     /// The same from a known length: two points of the picture (px from the left and from the top)
     /// and their distance at the tree, m, e.g. 310,340:305,80=2.6
@@ -68,6 +70,14 @@ impl ScaleArgs {
     }
 }
 
+/// Parses `--metres-per-px`.
+fn pixel_size(text: &str) -> Result<f64, String> {
+    match number(text) {
+        Some(metres) if metres == 0.0 || METRES_PER_PX.contains(&metres) => Ok(metres),
+        _ => Err("give the metres of a pixel, 0.000001 to 10, or 0 for lengths in pixels".into()),
+    }
+}
+
 /// Parses `U,V:U,V=METRES`.
 fn length(text: &str) -> Result<Known, String> {
     let ([a, b], metres) = points_and_distance(text)
@@ -77,14 +87,18 @@ fn length(text: &str) -> Result<Known, String> {
         return Err("the two points must be at least a pixel apart".into());
     }
     let metres_per_px = metres / px;
-    if metres_per_px > 0.0 && metres_per_px <= MAX_METRES_PER_PX {
-        Ok(Known {
-            ends: [a, b],
-            metres_per_px,
-        })
-    } else {
-        Err("the distance must be more than 0 metres".into())
+    if metres_per_px <= 0.0 {
+        return Err("the distance must be more than 0 metres".into());
     }
+    if metres_per_px > *METRES_PER_PX.end() {
+        return Err(format!(
+            "a pixel would have {metres_per_px} m, and at most 10 are taken; give the distance in metres"
+        ));
+    }
+    Ok(Known {
+        ends: [a, b],
+        metres_per_px,
+    })
 }
 
 /// Splits `U,V:U,V=METRES` into two points, px, and their distance, m.
@@ -132,8 +146,22 @@ mod tests {
             "0,0:30=1",
             "a,0:3,4=1",
             "0,0:3,4=nan",
+            "0,0:3,4=51",
         ] {
             assert!(length(bad).is_err(), "{bad:?}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_has_a_plausible_size() {
+        for (text, expected) in [("0", Some(0.0)), ("0.004", Some(0.004)), ("10", Some(10.0))] {
+            assert_eq!(pixel_size(text).ok(), expected);
+        }
+        for bad in ["1e9", "10.5", "1e-9", "-1", "nan", "wide"] {
+            assert!(
+                pixel_size(bad).is_err_and(|e| e.contains("0.000001 to 10")),
+                "{bad}"
+            );
         }
     }
 

@@ -130,7 +130,8 @@ impl Envelope {
 /// # Errors
 /// It cannot be read, or has no shape in it.
 pub fn read_drawn(path: &Path) -> anyhow::Result<Drawn> {
-    let bytes = std::fs::read(path).context("cannot read it")?;
+    let bytes = std::fs::read(path)
+        .map_err(|e| anyhow!("cannot read it: {e}; give an image or a polygon"))?;
     if bytes.iter().find(|b| !b.is_ascii_whitespace()) != Some(&b'{') {
         return Ok(Drawn::of_image(&bytes)?);
     }

@@ -1,6 +1,7 @@
 //! `arborcam sketch STROKES --out DIR`: a tree of drawn strokes.
 
 use super::command_error::CommandError;
+use super::common::whole_setting;
 use super::example::{read_drawing, stood_up};
 use super::output::eprint_line;
 use super::stop::Stop;
@@ -19,7 +20,7 @@ pub struct SketchArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Number of planes about the trunk on which the branches are repeated, drawn one included.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole_setting("shape.planes"))]
     planes: Option<u32>,
     /// Settings that differ from the defaults (TOML; see config/arborcam.toml).
     #[arg(long, value_name = "FILE")]

@@ -2,6 +2,7 @@
 
 use super::command_error::CommandError;
 use super::hangup::Reload;
+use super::plain::plain;
 use super::service::Service;
 use crate::model::{Control, Snapshot};
 use crate::runtime::Running;
@@ -29,7 +30,7 @@ impl CaptureSupervisor<'_> {
                 self.running.stop();
             }
             for line in self.running.news() {
-                progress.tell(&format!("arborcam: {line}"));
+                progress.tell(&plain(&format!("arborcam: {line}")));
             }
             if let Some(snapshot) = self.check() {
                 progress.update(&snapshot);

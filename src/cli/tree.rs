@@ -1,6 +1,7 @@
 //! Options for the tree of a capture, for the commands that export, draw or animate it.
 
 use super::command_error::CommandError;
+use super::common::{setting, whole_setting};
 use super::output::eprint_line;
 use super::scale::ScaleArgs;
 use super::shape::{ShapeArgs, read_drawn};
@@ -22,12 +23,12 @@ pub struct TreeArgs {
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Number of planes about the trunk on which the branches are repeated, filmed one included.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole_setting("shape.planes"))]
     planes: Option<u32>,
     #[command(flatten)]
     shape: ShapeArgs,
     /// Number of triangles of the wood; 10000 to 100000 for most uses.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole_setting("wood.triangles"))]
     triangles: Option<u32>,
     /// Whether the tree has leaves; `auto` decides by the film.
     #[arg(long, value_name = "WHEN")]
@@ -46,7 +47,7 @@ pub struct TreeArgs {
     #[arg(long, value_name = "N")]
     seed: Option<u32>,
     /// Longest animation, s; of a longer film the end is used.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = setting("export.animation_s"))]
     animation_s: Option<f64>,
     #[command(flatten)]
     scale: ScaleArgs,

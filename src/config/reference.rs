@@ -1,6 +1,6 @@
 //! The settings as users read them: the shipped file, the tables of the documentation, help texts.
 
-use super::setting::{Choice, Setting, SettingValue};
+use super::setting::{Choice, Range, Setting, SettingValue};
 use super::settings::{Config, SECTIONS};
 
 /// Width of the shipped file, characters.
@@ -66,6 +66,12 @@ pub fn help(key: &str) -> String {
         }
     }
     String::new()
+}
+
+/// The numbers that the setting `key` may have; `None` where every number will do.
+pub fn range(key: &str) -> Option<Range> {
+    let mut settings = SECTIONS.iter().flat_map(|section| section.settings);
+    settings.find(|setting| setting.key == key)?.range
 }
 
 fn described(setting: &Setting, value: &dyn SettingValue) -> String {

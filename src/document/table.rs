@@ -295,6 +295,12 @@ fn explain(file: &Path, e: csv::Error) -> DocumentError {
             source,
         },
         ErrorKind::Utf8 { .. } => DocumentError::row(file, line, "it is no text"),
-        other => DocumentError::row(file, line, format!("{other:?}")),
+        ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => {
+            let what = format!("it has {len} cells, and the first line {expected_len}");
+            DocumentError::row(file, line, what)
+        }
+        _ => DocumentError::row(file, line, "it cannot be read as a table"),
     }
 }

@@ -150,6 +150,10 @@ fn fixtures() -> &'static Path {
         );
         trunk("trunk-point.json", size, "[10, 10]");
         write("cut.json", br#"{"frame": 0, "width": 640,"#);
+        write(
+            "half.json",
+            br#"{"width": 640, "height": 360, "markers": [{"name": "A"#,
+        );
         write("words.json", b"the tree is in the middle");
         let mask = |name: &str, size: [u32; 2], shade: u8| {
             image::GrayImage::from_pixel(size[0], size[1], image::Luma([shade]))
@@ -242,6 +246,17 @@ fn check(name: &str, run: &Run, output: &Output, status: i32, says: &[&str], lef
         .any(|w| stderr.contains(w))
     {
         fail("a panic");
+    }
+    let of_libraries = [
+        "os error",
+        "EOF while",
+        "IoError",
+        "CSV error",
+        "is not in ",
+        "invalid digit",
+    ];
+    if of_libraries.iter().any(|w| stderr.contains(w)) {
+        fail("words of a library");
     }
     let ours: Vec<&str> = stderr
         .lines()
@@ -439,7 +454,7 @@ const CASES: &[Case] = &[
     (
         "replay {f}/clip.mkv --outline {f}/cut.json",
         BAD_USAGE,
-        &["cut.json", "line 1", "draw it"],
+        &["cut.json", "line 1", "it is cut off", "draw it"],
         Nothing,
     ),
     (
@@ -587,7 +602,54 @@ const CASES: &[Case] = &[
         &["none.toml", "check the name"],
         Nothing,
     ),
+    (
+        "replay {f}/clip.mkv --config {f}/nothing",
+        BAD_USAGE,
+        &["nothing", "it is a folder", "check the name"],
+        Nothing,
+    ),
     // Options.
+    (
+        "replay {f}/clip.mkv --markers {f}/half.json",
+        BAD_USAGE,
+        &[
+            "--markers",
+            "half.json",
+            "it is cut off at line 1",
+            "must hold width",
+        ],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --trunk {f}/nothing",
+        BAD_USAGE,
+        &["--trunk", "it is a folder", "give a file, or auto"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --branch-stroke {f}/empty.mkv",
+        BAD_USAGE,
+        &["--branch-stroke", "it is empty", "polyline_px"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --metres-per-px 1e9",
+        BAD_USAGE,
+        &["--metres-per-px", "0.000001 to 10"],
+        Nothing,
+    ),
+    (
+        "replay {f}/clip.mkv --tag 100",
+        BAD_USAGE,
+        &["--tag", "0.005 to 5"],
+        Nothing,
+    ),
+    (
+        "capture /dev/video99 --device-timeout 0",
+        BAD_USAGE,
+        &["--device-timeout", "0.05 to 3600"],
+        Nothing,
+    ),
     (
         "replay {f}/one --fps 0",
         BAD_USAGE,
@@ -603,7 +665,7 @@ const CASES: &[Case] = &[
     (
         "replay {f}/clip.mkv --metres-per-px=-1",
         BAD_USAGE,
-        &["metres_per_px = -1", "allowed"],
+        &["'-1'", "--metres-per-px", "0.000001 to 10"],
         Nothing,
     ),
     (
@@ -619,6 +681,21 @@ const CASES: &[Case] = &[
         Nothing,
     ),
     ("film {f}/clip.mkv", BAD_USAGE, &["film"], Nothing),
+    (
+        "forest",
+        BAD_USAGE,
+        &[
+            "no command `forest`",
+            "arborcam grow EXAMPLE --count N --forest",
+        ],
+        Nothing,
+    ),
+    (
+        "anaylze {f}/one",
+        BAD_USAGE,
+        &["no command `anaylze`", "is `analyze` meant?"],
+        Nothing,
+    ),
 ];
 
 #[test]
@@ -631,6 +708,65 @@ fn every_bad_input_gets_its_status_and_a_line_and_leaves_nothing_half_done() {
         }
         let output = run.end();
         check(words, &run, &output, status, says, left);
+    }
+}
+
+/// What is out of range is told by the option's name, and not by that of the setting behind it.
+#[test]
+fn options_are_told_by_their_names() {
+    for (words, says) in [
+        (
+            "animate x --wind 99",
+            "'--wind <FORCE>': give a number: 0 (still) to 12",
+        ),
+        (
+            "animate x --wind fast",
+            "'--wind <FORCE>': give a number: 0",
+        ),
+        (
+            "animate x --direction 999",
+            "'--direction <DEGREES>': give a number: -360 to 360",
+        ),
+        ("animate x --gusts 2", "'--gusts <SHARE>'"),
+        ("animate x --beta 9", "'--beta <BETA>'"),
+        (
+            "render x --out x.png --planes 99",
+            "'--planes <N>': give a whole number: 1 to 8",
+        ),
+        (
+            "render x --out x.png --triangles 1",
+            "'--triangles <N>': give a whole number: 100 to",
+        ),
+        (
+            "render x --out x.png --animation-s 0",
+            "'--animation-s <SECONDS>': give a number: 0.1 to",
+        ),
+        (
+            "sketch x --out x --planes 0",
+            "'--planes <N>': give a whole number: 1 to 8",
+        ),
+        (
+            "grow x --out x --count 0",
+            "'--count <N>': give a number from 1 to 100000",
+        ),
+        (
+            "grow x --out x --count 2 --seed x",
+            "'--seed <N>': give a whole number",
+        ),
+        (
+            "cloud x --out x --tree 0",
+            "'--tree <N>': give a number from 1 on",
+        ),
+        ("replay x --fps fast", "'--fps <RATE>': give a number"),
+    ] {
+        let mut run = Run::new(words);
+        let output = run.end();
+        check(words, &run, &output, BAD_USAGE, &[says], Nothing);
+        assert_eq!(
+            String::from_utf8_lossy(&output.stderr).lines().count(),
+            1,
+            "{words}"
+        );
     }
 }
 

@@ -1,6 +1,6 @@
 //! Options of `arborcam animate`.
 
-use super::super::common::{parse_within, seconds};
+use super::super::common::{parse_within, seconds, setting};
 use super::super::render::{ViewName, WHITE, background, rate, size};
 use super::super::tree::TreeArgs;
 use crate::bounds::Bounds;
@@ -32,18 +32,18 @@ pub struct AnimateArgs {
     #[arg(long, value_name = "RATE", default_value_t = 30.0, value_parser = rate)]
     pub fps: f64,
     /// Strength of the wind on the Beaufort scale, 0 (still) to 12.
-    #[arg(long, value_name = "FORCE")]
+    #[arg(long, value_name = "FORCE", value_parser = setting("wind.force"))]
     pub wind: Option<f64>,
     /// Direction that the wind blows to or --pull pulls to, degrees about the trunk: 0 to the right
     /// of the picture, 90 away from the camera.
-    #[arg(long, value_name = "DEGREES")]
+    #[arg(long, value_name = "DEGREES", value_parser = setting("wind.direction_deg"))]
     pub direction: Option<f64>,
     /// Variation of the wind speed relative to its mean, 0 (steady) to 1.
-    #[arg(long, value_name = "SHARE")]
+    #[arg(long, value_name = "SHARE", value_parser = setting("wind.gusts"))]
     pub gusts: Option<f64>,
     /// Exponent of the gust spectrum, 0 (rough) to 4 (smooth): power is proportional to frequency
     /// to the minus beta.
-    #[arg(long, value_name = "BETA")]
+    #[arg(long, value_name = "BETA", value_parser = setting("wind.beta"))]
     pub beta: Option<f64>,
     /// Make the animation a seamless loop.
     #[arg(long = "loop")]
