@@ -389,7 +389,7 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
         warnings.push(format!(
             "{:.0} % of the branches run level, as edges of buildings do and branches seldom: look whether a wall \
              is among them",
-            100.0 * tree.seen.level_share
+            100.0 * tree.seen.level_share_left
         ));
     }
     for index in &tree.seen.doubtful {

@@ -90,9 +90,9 @@ fn length(text: &str) -> Result<Known, String> {
     if metres_per_px <= 0.0 {
         return Err("the distance must be more than 0 metres".into());
     }
-    if metres_per_px > *METRES_PER_PX.end() {
+    if !METRES_PER_PX.contains(&metres_per_px) {
         return Err(format!(
-            "a pixel would have {metres_per_px} m, and at most 10 are taken; give the distance in metres"
+            "a pixel would have {metres_per_px} m, and 0.000001 to 10 are taken; give the distance in metres"
         ));
     }
     Ok(Known {
@@ -163,13 +163,22 @@ mod tests {
                 "{bad}"
             );
         }
+        for bad in ["0,0:600,0=0.00006", "0,0:600,0=60000"] {
+            assert!(
+                length(bad).is_err_and(|e| e.contains("0.000001 to 10")),
+                "{bad}"
+            );
+        }
     }
 
     /// Whether a known length is accepted for a picture of 640x360.
     fn fits(text: &str) -> bool {
+        let Ok(known) = length(text) else {
+            return false;
+        };
         let args = ScaleArgs {
             metres_per_px: None,
-            scale: length(text).ok(),
+            scale: Some(known),
         };
         args.check_size(Size::new(640, 360)).is_ok()
     }

@@ -497,6 +497,22 @@ mod tests {
         assert!(reordered.contains(LEFT_OUT_FILE), "{reordered}");
     }
 
+    #[test]
+    fn depths_that_were_seen_are_read_and_no_others() {
+        let dir = tempfile::tempdir().unwrap();
+        let rows = "1,0,0,3.5,4,7,2.0312,0.004\n1,1,0.1,3,4,7,,\n1,2,0.2,3,5,7,1.98,0.004\n2,2,0.2,3,5,7,0,0.1\n";
+        let text = format!("{TRACKS_WITH_DEPTH_HEADER}\n{rows}");
+        fs::write(dir.path().join(TRACKS_FILE), text).unwrap();
+        let points = read_points(dir.path(), &one_branch(), 60.0, Bounds::new(0.0, 60.0)).unwrap();
+        let depths = points.depths(TrackId(1));
+        let times_s: Vec<f64> = depths.iter().map(|at| at.time_s).collect();
+        assert_eq!(times_s, [0.0, 0.2]);
+        assert!(
+            (depths[0].depth_m - 2.0312).abs() < 1e-6 && (depths[1].depth_m - 1.98).abs() < 1e-6
+        );
+        assert_eq!(points.depths(TrackId(2)), []);
+    }
+
     /// To the last bit, of a camera that moves: what an analysis finds may hang on it.
     #[test]
     fn a_film_is_known_as_its_tables_give_it_back() {

@@ -8,7 +8,7 @@
 use crate::document::{TableWriter, unit};
 use crate::files::WriteError;
 use crate::geometry::Cylinder;
-use crate::model::{NodeId, Skeleton, SwayColumns, Swaying};
+use crate::model::{BotanicalBranches, NodeId, Skeleton, SwayColumns, Swaying};
 use crate::shape::Limb;
 use nalgebra::Point3;
 use std::fmt::Write as _;
@@ -79,32 +79,14 @@ impl Qsm {
         let (scale, more) = unit(metres_per_px);
         let place = |at: &Point3<f64>| foot + nalgebra::Vector3::new(at.x, -at.z, at.y) * scale;
         let mut pieces: Vec<Piece> = Vec::with_capacity(cylinders.len());
-        let mut is_base: Vec<bool> = Vec::with_capacity(cylinders.len());
+        let branches = skeleton.botanical_branches();
         for own in cylinders {
             let node = limbs[own.limb].node;
-            is_base.push(match own.parent {
-                Some(p) => {
-                    cylinders[p].branch != own.branch
-                        || (cylinders[p].limb == own.limb && is_base[p])
-                }
-                None => false,
-            });
-            // The first limb of a branch begins inside of what carries it, and is no thicker there
-            // than where it comes out.
-            let last = limbs[own.limb]
-                .samples
-                .last()
-                .map_or(own.radius, |s| s.radius);
-            let radius = if is_base.last() == Some(&true) {
-                own.radius.min(last)
-            } else {
-                own.radius
-            };
             pieces.push(Piece {
                 parent: own.parent,
                 start: place(&own.start),
                 end: place(&own.end),
-                radius: radius * scale,
+                radius: own.radius * scale,
                 length: (own.end - own.start).norm() * scale,
                 growth_length: 0.0,
                 segment: 0,
@@ -113,7 +95,7 @@ impl Qsm {
                 order: own.order,
                 reverse_order: 1,
                 extension: None,
-                sway: sway_of(skeleton, sway, node),
+                sway: sway_of(skeleton, &branches, sway, node),
                 nearest: None,
             });
         }
@@ -121,8 +103,34 @@ impl Qsm {
             pieces,
             decimals: 4 + more,
         };
+        qsm.thin_within_carriers();
         qsm.complete();
         qsm
+    }
+
+    /// A branch begins within what carries it, and is no thicker there than where it comes out.
+    fn thin_within_carriers(&mut self) {
+        let pieces = &mut self.pieces;
+        // The first cylinder of the branch of each that lies within the carrier.
+        let mut begin: Vec<Option<usize>> = Vec::with_capacity(pieces.len());
+        for (i, own) in pieces.iter().enumerate() {
+            let first = match own.parent {
+                Some(p) if pieces[p].branch != own.branch => Some(i),
+                Some(p) => begin[p],
+                None => None,
+            };
+            begin.push(first.filter(|first| {
+                let carrier = pieces[*first].parent.map_or(0.0, |p| pieces[p].radius);
+                (own.start - pieces[*first].start).norm() < carrier
+            }));
+        }
+        for i in (0..pieces.len()).rev() {
+            let own = &pieces[i];
+            let goes_on = own.parent.filter(|p| pieces[*p].branch == own.branch);
+            if let Some(p) = goes_on.filter(|p| begin[*p].is_some()) {
+                pieces[p].radius = pieces[p].radius.min(pieces[i].radius);
+            }
+        }
     }
 
     /// Finds what follows from parents and branches.
@@ -287,9 +295,17 @@ impl Piece {
     }
 }
 
-/// The sway of the branch that a node is a part of.
-fn sway_of(skeleton: &Skeleton, sway: &[Swaying], node: NodeId) -> SwayColumns {
+/// The sway of the branch that a node is a part of; none of one that is a rigid part of what carries it.
+fn sway_of(
+    skeleton: &Skeleton,
+    branches: &BotanicalBranches,
+    sway: &[Swaying],
+    node: NodeId,
+) -> SwayColumns {
     let mover = skeleton.mover(node);
+    if branches.of(mover) != branches.of(node) {
+        return SwayColumns::of(None);
+    }
     SwayColumns::of(sway.get(mover.index()).and_then(|s| s.as_ref().ok()))
 }
 
@@ -334,7 +350,10 @@ mod tests {
 
     /// The same with these frequencies of nodes, Hz.
     fn swaying(measured: &[(usize, f64)]) -> Qsm {
-        let skeleton = Skeleton::forked();
+        of_tree(Skeleton::forked(), measured)
+    }
+
+    fn of_tree(skeleton: Skeleton, measured: &[(usize, f64)]) -> Qsm {
         let plain = crate::config::Wood {
             curl: 0.0,
             max_twigs: 0,
@@ -399,6 +418,40 @@ mod tests {
             .iter()
             .map(|row| row[column("length")].parse::<f64>().expect("number"));
         assert!((growth - lengths.sum::<f64>()).abs() < 0.01);
+    }
+
+    /// A branch tapers, and is thinned only where it lies within what carries it.
+    #[test]
+    fn a_branch_is_as_thick_as_it_is_drawn() {
+        let qsm = qsm();
+        let (limbs, pieces) = (qsm.pieces.iter().filter(|p| p.branch == 1), &qsm.pieces);
+        let radii: Vec<f64> = limbs.map(|p| p.radius).collect();
+        assert!(
+            radii.len() > 3 && radii[0] > 1.2 * radii[radii.len() - 1],
+            "{radii:?}"
+        );
+        assert!(radii.windows(2).all(|r| r[0] >= r[1]), "{radii:?}");
+        assert!(pieces[0].radius >= radii[0]);
+    }
+
+    /// The left limb is a rigid part of the trunk: it has no sway of its own, and swings with that.
+    #[test]
+    fn what_rides_on_a_measured_branch_was_not_measured() {
+        let mut skeleton = Skeleton::forked();
+        skeleton.nodes[2].moves_with = Some(NodeId(1));
+        let rides_on = skeleton.botanical_branches();
+        let is_apart = rides_on.of(NodeId(2)) != rides_on.of(NodeId(1));
+        let rider = if is_apart { 2 } else { 3 };
+        skeleton.nodes[2].moves_with = None;
+        skeleton.nodes[rider].moves_with = Some(NodeId(1));
+        let qsm = of_tree(skeleton, &[(1, 0.5)]);
+        let side = qsm.pieces.iter().filter(|p| p.branch == 1);
+        for own in side {
+            assert!(own.sway.frequency().is_none());
+            let nearest = own.nearest.map(|n| &qsm.pieces[n]).expect("the trunk");
+            assert_eq!((nearest.branch, nearest.sway.frequency_hz), (0, 0.5));
+        }
+        assert!(qsm.pieces.iter().any(|p| p.branch == 1));
     }
 
     #[test]

@@ -65,6 +65,7 @@ struct Columns {
 /// A column is missing, a row cannot be read, or what it grows from is not in the table.
 pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+    let bytes = bytes.trim_ascii_start();
     let separator = separator_of(&String::from_utf8_lossy(bytes));
     let mut table = csv::ReaderBuilder::new()
         .delimiter(separator as u8)
@@ -186,6 +187,7 @@ mod tests {
             .replace("\n2,1", "\n1,0")
             .replace("\n1,0,0,0,0,0", "\n0,-1,0,0,0,0");
         assert_eq!(edges(with_minus.as_bytes()), Ok(archi));
+        assert_eq!(edges(format!("  \n\n{table}").as_bytes()), Ok(file.clone()));
         for separator in [";", "\t"] {
             let other = table.replace(',', separator);
             assert_eq!(edges(other.as_bytes()), Ok(file.clone()), "{other}");

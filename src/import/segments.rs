@@ -23,6 +23,18 @@ pub(super) struct Segment {
     pub wood: Wood,
 }
 
+/// Places are no farther from the origin of the table than this, in its unit: coordinates of maps have up to 1e7
+/// m, or 1e10 mm. No wood has so great a radius.
+const FARTHEST: f64 = 1e11;
+const THICKEST: f64 = 1e6;
+
+/// Whether its place and its radius may be those of a piece of a tree.
+fn is_plausible(own: &Segment) -> bool {
+    let places = own.start.iter().chain([&own.end]);
+    let mut numbers = places.flat_map(|at| at.iter());
+    numbers.all(|x| x.abs() < FARTHEST) && own.wood.radius < THICKEST
+}
+
 /// The number of a piece; `None` where it is none.
 pub(super) fn id(cell: f64) -> Option<i64> {
     (cell.fract() == 0.0 && cell.abs() < LARGEST_ID).then_some(cell as i64)
@@ -50,6 +62,12 @@ pub(super) fn wood(radius: f64, sway: [f64; 6]) -> Wood {
 /// circle.
 pub(super) fn edges(mut segments: Vec<Segment>) -> Result<Edges, ImportError> {
     refuse_more("pieces", segments.len(), MOST_PLACES / 2)?;
+    if let Some(own) = segments.iter().find(|own| !is_plausible(own)) {
+        return Err(ImportError::bad_format(format!(
+            "piece {} has a place or a radius that no tree has",
+            own.id
+        )));
+    }
     segments.sort_by_key(|s| s.id);
     let twice = segments.windows(2).find(|pair| pair[0].id == pair[1].id);
     if let Some([one, _]) = twice {

@@ -68,7 +68,8 @@ fn cells(line: &str, separator: char) -> impl Iterator<Item = &str> {
 
 impl Columns {
     fn of(header: &str, separator: char) -> Option<Self> {
-        let names: Vec<&str> = cells(header, separator).collect();
+        let names = cells(header, separator).map(|name| name.trim_matches('"'));
+        let names: Vec<&str> = names.collect();
         let of_tree = names.iter().position(|name| *name == "x")?;
         let segment = &names[of_tree..];
         let column = |name: &str| segment.iter().position(|n| *n == name);
@@ -137,6 +138,11 @@ mod tests {
         for separator in [";", "\t"] {
             assert_eq!(edges(&FORK.replace(',', separator)), Ok(file.clone()));
         }
+        let quoted = FORK.replace(
+            "x,y,z,radius,parent_id",
+            r#""x","y","z","radius","parent_id""#,
+        );
+        assert_eq!(edges(&quoted), Ok(file));
     }
 
     /// Parents may stand behind what grows from them.

@@ -69,8 +69,9 @@ pub(super) fn by_pipes(grown: &mut [Grown], skeleton: &Skeleton, trunk_radius_px
 }
 
 /// Thickness of the branches whose wood the picture shows: from node to node as the skeleton says, and to
-/// a twig's at a tip. One that leaves another is no thicker at its begin than makes it as thick as it is seen. An unseen branch in which a seen one goes on begins as thick as that ends. Others stay
-/// as thick as they are, and like twigs no thicker than what they grow from.
+/// a twig's at a tip. One that leaves another begins so thick that its middle is as thick as it is seen. An
+/// unseen branch in which a seen one goes on begins as thick as that ends. Others stay as thick as they are,
+/// and like twigs no thicker than what they grow from.
 pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
     if skeleton.nodes.iter().all(|n| n.kind != NodeKind::Traced) {
         return;
@@ -341,5 +342,13 @@ mod tests {
         let ends = radii(4);
         assert!(ends[ends.len() - 1] <= TIP_RADIUS_PX, "{ends:?}");
         assert!(ends[0] > 5.0, "{ends:?}");
+        // A thin one does not begin as thick as the trunk: it is as thick as seen in its middle.
+        let mut thin = traced();
+        thin.nodes[4].radius = 2.0;
+        let all = limbs(&thin, &|_, _| true, &bare, 1);
+        let limb = all.iter().find(|limb| limb.node.index() == 4);
+        let samples = &limb.expect("a limb").samples;
+        let mean = samples.iter().map(|s| s.radius).sum::<f64>() / samples.len() as f64;
+        assert!((mean - 2.0).abs() < 1e-9, "{mean}");
     }
 }

@@ -45,10 +45,13 @@ const THICK: f32 = 2.5;
 const LEAST_TRUNK_PX: f32 = 3.0;
 /// Below the trunk's foot, within so many of its radii, there are no branches.
 const NEAR_FOOT: f64 = 10.0;
-/// A branch is a wall of whose length, with all that it carries, so great a share runs level, and as much as
-/// this share of the whole tree's.
+/// A branch is a wall of whose length, with all that it carries, so great a share runs level: four times what
+/// whole trees have at most (0.054), as parts of them may have more. As much as this share of the whole tree's
+/// length is level at least, so that no level twig is one, and it carries less than half of the tree. Not fitted:
+/// set before the photographs of `docs/photo.md` were looked at.
 const WALL_LEVEL: f64 = 0.2;
 const WALL_LENGTH: f64 = 0.005;
+const WALL_CARRIES: f64 = 0.5;
 /// Where so great a share of a piece of a branch is leaves, its width is not seen.
 const HIDDEN: f64 = 0.5;
 
@@ -81,8 +84,10 @@ pub struct SeenInPhotograph {
     pub doubtful: Vec<usize>,
     /// The leaves have the colours of what is around the crown, as those of a lawn do.
     pub is_as_around: bool,
-    /// The share of the branches' length that runs level, as edges of buildings do.
+    /// The share of the length of all that was traced that runs level, as edges of buildings do; and of the
+    /// branches that are left without such edges.
     pub level_share: f64,
+    pub level_share_left: f64,
     /// Leaves were looked for as green, and half of the crown is red.
     pub may_have_red_leaves: bool,
 }
@@ -99,7 +104,7 @@ const MUCH_LEVEL: f64 = 0.05;
 impl SeenInPhotograph {
     /// Whether so much of the branches runs level that a wall may be among them.
     pub fn may_hold_walls(&self) -> bool {
-        self.level_share > MUCH_LEVEL
+        self.level_share_left > MUCH_LEVEL
     }
 }
 
@@ -217,6 +222,7 @@ pub fn beside_leaves(
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
     let level_share = branches.level_share();
     branches = without_walls(&branches, &on_strokes.is_stroke, size);
+    let level_share_left = branches.level_share();
     hide_radii(&mut branches, leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -246,6 +252,7 @@ pub fn beside_leaves(
         doubtful: on_strokes.doubtful,
         is_as_around: mask.in_leaf && is_as_around,
         level_share,
+        level_share_left,
         may_have_red_leaves: photo.leaves == LeafHint::Unknown
             && share_of(photo.picture, within, LeafColour::Red) > RED_SHARE
             && share_of(photo.picture, within, LeafColour::Green) < GREEN_SHARE,
@@ -419,7 +426,7 @@ fn without_walls(branches: &BranchGraph, is_stroke: &[bool], size: Size) -> Bran
     for (carried, leads_to_stroke) in carried.iter().zip(leads_to_stroke) {
         let is_wall = carried.level_px > WALL_LEVEL * carried.all_px
             && carried.level_px > WALL_LENGTH * all_px
-            && carried.all_px < 0.5 * all_px;
+            && carried.all_px < WALL_CARRIES * all_px;
         is_kept.push(leads_to_stroke || !is_wall);
     }
     branches.of_nodes(&is_kept)

@@ -102,7 +102,7 @@ mod tests {
             up_m: None,
         };
         for (code, expected) in [
-            // New York Long Island, Oregon North, UTM 32, a grid in links, Singapore in metres.
+            // New York Long Island, Oregon North, UTM 32, a grid in chains of 100 links.
             (2263, lengths(US_FOOT_M)),
             (2992, lengths(0.3048)),
             (25832, lengths(1.0)),
