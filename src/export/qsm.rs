@@ -80,8 +80,17 @@ impl Qsm {
         let place = |at: &Point3<f64>| foot + nalgebra::Vector3::new(at.x, -at.z, at.y) * scale;
         let mut pieces: Vec<Piece> = Vec::with_capacity(cylinders.len());
         let branches = skeleton.botanical_branches();
+        let mut of_twig: Vec<bool> = Vec::with_capacity(cylinders.len());
         for own in cylinders {
-            let node = limbs[own.limb].node;
+            let limb = &limbs[own.limb];
+            // A twig hangs on the node of a branch, and is none of it unless that goes on in it.
+            let goes_on = own.parent.filter(|p| cylinders[*p].branch == own.branch);
+            let is_of_twig = goes_on.map_or(limb.twig && own.parent.is_some(), |p| of_twig[p]);
+            of_twig.push(is_of_twig);
+            let own_sway = match is_of_twig {
+                true => SwayColumns::of(None),
+                false => sway_of(skeleton, &branches, sway, limb.node),
+            };
             pieces.push(Piece {
                 parent: own.parent,
                 start: place(&own.start),
@@ -95,7 +104,7 @@ impl Qsm {
                 order: own.order,
                 reverse_order: 1,
                 extension: None,
-                sway: sway_of(skeleton, &branches, sway, node),
+                sway: own_sway,
                 nearest: None,
             });
         }

@@ -595,7 +595,7 @@ const CASES: &[Case] = &[
     (
         "{c} --format glb --out {w}/t.glb --planes 99",
         BAD_USAGE,
-        &["shape.planes = 99", "1 to 8"],
+        &["'99'", "--planes", "1 to 8"],
     ),
     (
         "{c} --format glb --out {w}/t.glb --tolerance-px 0",
@@ -605,7 +605,7 @@ const CASES: &[Case] = &[
     (
         "{c} --format glb --out {w}/t.glb --metres-per-px NaN",
         BAD_USAGE,
-        &["export.metres_per_px"],
+        &["'NaN'", "--metres-per-px", "0.000001 to 10"],
     ),
     (
         "{c} --format glb --out {w}/t.glb --config {w}/bad.toml",
