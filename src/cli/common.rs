@@ -100,8 +100,8 @@ pub fn parse_within(text: &str, range: RangeInclusive<f64>, hint: &str) -> Resul
     }
 }
 
-/// A parser of the setting `key`, for an option that gives it: what is out of range is told by the option's
-/// name, and not by that of the setting.
+/// A parser of the setting `key`, for an option that gives it: its message on what is out of range names
+/// the option, and not the setting.
 pub fn setting(key: &'static str) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| within_setting(text, key, "number")
 }

@@ -385,11 +385,11 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if tree.seen.may_hold_walls() {
+    if let Some(level) = tree.seen.walls_share() {
         warnings.push(format!(
             "{:.0} % of the branches run level, as edges of buildings do and branches seldom: look whether a wall \
              is among them",
-            100.0 * tree.seen.level_share_left
+            100.0 * level
         ));
     }
     for index in &tree.seen.doubtful {

@@ -81,9 +81,11 @@ pub fn run(common: &Common, plan: Plan) -> Result<(), CommandError> {
     let messages = last_messages(&running, headless);
     let (summary, failure) = running.join();
     watched?;
-    // Markers that cannot be followed end a run in its first frame: there is nothing else to be told of it.
-    let is_refused = matches!(failure, Some(Failure::Markers(_)));
-    for line in messages.iter().filter(|_| !is_refused) {
+    // Markers that cannot be followed end a run in its first frame: there is nothing else to say of it.
+    if let Some(Failure::Markers(_)) = failure {
+        return report(None, failure, stop.load(Ordering::SeqCst));
+    }
+    for line in messages {
         eprint_line(&format!("arborcam: {line}"));
     }
     report(summary.as_ref(), failure, stop.load(Ordering::SeqCst))
@@ -209,8 +211,7 @@ fn report(
     failure: Option<Failure>,
     stopped: bool,
 ) -> Result<(), CommandError> {
-    let is_refused = matches!(failure, Some(Failure::Markers(_)));
-    if let Some(s) = summary.filter(|_| !is_refused) {
+    if let Some(s) = summary {
         for line in closing_lines(s) {
             eprint_line(&line);
         }

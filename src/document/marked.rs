@@ -317,6 +317,7 @@ fn parents_first(parent_of: &[Option<usize>]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::document::note::DepthNote;
     use crate::document::tracks::DepthAt;
     use crate::dynamics::{FilmTrack, angle_in_space_deg, angle_to_parent_deg};
     use crate::model::Size;
@@ -325,14 +326,11 @@ mod tests {
     /// by how much.
     #[test]
     fn a_marker_that_swings_in_depth_has_its_angle_in_space() {
-        let image_size = Size {
-            width: 641,
-            height: 481,
-        };
-        let note = crate::document::note::DepthNote {
+        let image_size = Size::new(641, 481);
+        let note = DepthNote {
             foot_m: 2.0,
             metres_per_px: 0.004,
-            ..Default::default()
+            ..DepthNote::default()
         };
         // The foot is on the camera's axis, the marker 0.4 m above it.
         let foot_px = Point2::new(320.0, 240.0);

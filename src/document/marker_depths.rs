@@ -135,10 +135,7 @@ mod tests {
 
     #[test]
     fn what_comes_nearer_has_not_moved_across() {
-        let size = Size {
-            width: 641,
-            height: 481,
-        };
+        let size = Size::new(641, 481);
         let mut depths = MarkerDepths::before(Some(&camera()), size);
         let depths_m = [2.0, 1.9, 2.1];
         depths.add(MARKER, seen(&depths_m));
@@ -158,10 +155,7 @@ mod tests {
 
     #[test]
     fn a_depth_that_was_not_seen_is_no_number_and_without_a_camera_all_is_flat() {
-        let size = Size {
-            width: 640,
-            height: 480,
-        };
+        let size = Size::new(640, 480);
         let mut depths = MarkerDepths::before(Some(&camera()), size);
         depths.add(MARKER, seen(&[2.0]));
         assert!(depths.z_px(MARKER, 0.5).is_nan() && depths.z_px(NodeId(2), 0.0).is_nan());

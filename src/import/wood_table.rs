@@ -3,7 +3,7 @@
 /// What stands between the cells of a table.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
-/// A table in which a tree is told by pieces of wood.
+/// A table of the pieces of wood that make up a tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WoodTable {
     /// A row for each cylinder.

@@ -252,6 +252,8 @@ fn kept_samples(line: &[Sample], forks: &[usize]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Size;
+    use crate::signal::distance_to_segment;
 
     /// The first places of a branch lie in the limb that it leaves, and are as wide as that.
     #[test]
@@ -267,10 +269,6 @@ mod tests {
         assert_eq!((first, median_radius(&line[first..])), (7, 2.0));
         assert_eq!(first_beside(&line[..4]), 3);
     }
-
-    use crate::model::Size;
-    use crate::signal::distance_to_segment;
-    use nalgebra::distance;
 
     const SIZE: Size = Size {
         width: 200,

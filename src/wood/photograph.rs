@@ -84,10 +84,9 @@ pub struct SeenInPhotograph {
     pub doubtful: Vec<usize>,
     /// The leaves have the colours of what is around the crown, as those of a lawn do.
     pub is_as_around: bool,
-    /// The share of the length of all that was traced that runs level, as edges of buildings do; and of the
-    /// branches that are left without such edges.
+    /// The share of the length of all that was traced that runs level, as edges of buildings do; those that were
+    /// taken off count.
     pub level_share: f64,
-    pub level_share_left: f64,
     /// Leaves were looked for as green, and half of the crown is red.
     pub may_have_red_leaves: bool,
 }
@@ -102,9 +101,10 @@ const GREEN_SHARE: f64 = 0.25;
 const MUCH_LEVEL: f64 = 0.05;
 
 impl SeenInPhotograph {
-    /// Whether so much of the branches runs level that a wall may be among them.
-    pub fn may_hold_walls(&self) -> bool {
-        self.level_share_left > MUCH_LEVEL
+    /// The share of the branches' length that runs level where so much does that a wall may be among them.
+    pub fn walls_share(&self) -> Option<f64> {
+        let left = self.wood.branches.level_share();
+        (left > MUCH_LEVEL).then_some(left)
     }
 }
 
@@ -222,7 +222,6 @@ pub fn beside_leaves(
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
     let level_share = branches.level_share();
     branches = without_walls(&branches, &on_strokes.is_stroke, size);
-    let level_share_left = branches.level_share();
     hide_radii(&mut branches, leaves, size);
     let mut wood = probability::mask_of_wood(&mask, size);
     let mut tree = leaves.clone();
@@ -252,7 +251,6 @@ pub fn beside_leaves(
         doubtful: on_strokes.doubtful,
         is_as_around: mask.in_leaf && is_as_around,
         level_share,
-        level_share_left,
         may_have_red_leaves: photo.leaves == LeafHint::Unknown
             && share_of(photo.picture, within, LeafColour::Red) > RED_SHARE
             && share_of(photo.picture, within, LeafColour::Green) < GREEN_SHARE,
@@ -413,7 +411,7 @@ fn without_roots(branches: &BranchGraph) -> BranchGraph {
 /// walls and rows of windows. What carries half of the tree is none.
 fn without_walls(branches: &BranchGraph, is_stroke: &[bool], size: Size) -> BranchGraph {
     let carried = branches.carried_px();
-    let all_px = carried.first().map_or(0.0, |all| all.all_px);
+    let all_px = branches.length_px();
     let mut leads_to_stroke = vec![false; branches.nodes.len()];
     for (i, node) in branches.nodes.iter().enumerate().rev() {
         let pixel = size.pixel_at(node.position_px);

@@ -711,7 +711,7 @@ fn every_bad_input_gets_its_status_and_a_line_and_leaves_nothing_half_done() {
     }
 }
 
-/// What is out of range is told by the option's name, and not by that of the setting behind it.
+/// The message on what is out of range names the option, and not the setting behind it.
 #[test]
 fn options_are_told_by_their_names() {
     for (words, says) in [

@@ -54,7 +54,7 @@ where
     read.unwrap_or_else(|| Err(ImportError::bad_format("its compressed points are damaged")))
 }
 
-/// Refuses what is something else. What is shorter is cut off, which is told later.
+/// Refuses what is something else. What is shorter is cut off, which is found later.
 fn check_begin(input: &mut (impl Read + Seek)) -> Result<(), ImportError> {
     let mut begin = Vec::new();
     let read = input.take(BEGIN.len() as u64).read_to_end(&mut begin);
