@@ -14,6 +14,9 @@ use std::collections::VecDeque;
 const AROUND: usize = 32;
 /// Fewer steps than this say nothing of the rate.
 const LEAST_STEPS: usize = 4;
+/// Where there are fewer on one side than this the other, longer one tells the rate alone: of so few, with a third of
+/// the frames lost, now and then none is of one frame. Of more, a camera that begins slowly has lost none.
+const SHORT_SIDE: usize = 12;
 /// A frame that came late is made up for within so many steps.
 const MADE_UP: usize = 6;
 /// A driver that numbers only what it delivers shows no hole: its times are believed from so many
@@ -240,13 +243,7 @@ impl Losses {
     fn judge(&mut self) -> Option<Gap> {
         let at = self.next;
         self.next += 1;
-        // The slower of before and after: where the rate changes, no frame is lost for it.
-        let before = self.interval_of(at.saturating_sub(AROUND + 1), at);
-        let after = self.interval_of(at - 1, (at + AROUND).min(self.ticks.len()));
-        let interval_s = match (before, after) {
-            (Some(a), Some(b)) => a.max(b),
-            (a, b) => a.or(b)?,
-        };
+        let interval_s = self.interval_about(at)?;
         let (mut later, mut sooner) = (u64::MAX, u64::MAX);
         for k in 0..MADE_UP {
             if let Some(missing) = self.missing_between(at - 1, at + k, interval_s) {
@@ -277,6 +274,23 @@ impl Losses {
             cause: GapCause::Dropped,
             length_s,
         })
+    }
+
+    /// Time from frame to frame where the step to the tick `at` is judged: the slower of before and after, as no frame
+    /// is lost where the rate changes. At either end of a film the shorter side may have too few to say.
+    fn interval_about(&self, at: usize) -> Option<f64> {
+        let first = at.saturating_sub(AROUND + 1);
+        let last = self.ticks.len().min(at + AROUND);
+        let (n_before, n_after) = (at - first, last - at);
+        let before = self.interval_of(first, at);
+        let after = self.interval_of(at - 1, last);
+        match (before, after) {
+            (Some(before), Some(after)) if n_before.min(n_after) >= SHORT_SIDE => {
+                Some(before.max(after))
+            }
+            (before, after) if n_before > n_after => before.or(after),
+            (before, after) => after.or(before),
+        }
     }
 
     /// Frames missing from one tick to another by their times.

@@ -236,6 +236,12 @@ fn a_run_of_losses_is_no_slower_rate() -> Result<(), TestCaseError> {
     check_random_losses(1_780_979_539_560_061_337, 37)
 }
 
+/// Nor is one at the very beginning, where no frames are before it.
+#[test]
+fn a_run_of_losses_at_the_beginning_is_no_slower_rate() -> Result<(), TestCaseError> {
+    check_random_losses(8_458_814_089_425_371_295, 35)
+}
+
 proptest! {
     /// Up to 40 % lost at random, and times off by up to a sixth of an interval.
     #[test]
