@@ -96,6 +96,7 @@ def make_wood(folder, seed, leafy, count):
     distances = np.linspace(1, FARTHEST, count) if count > 1 else np.ones(1)
     columns = (0.1 + 0.8 * (rng.permutation(count) + 0.5 + rng.uniform(-0.15, 0.15, count)) / count) * picture.WIDTH
     trees, folder_facts = [], []
+    covered = dict.fromkeys(["wood.png", "leaves.png"], np.zeros((picture.HEIGHT, picture.WIDTH), np.uint8))
     folder.mkdir(parents=True, exist_ok=True)
     for k, (distance, column) in enumerate(zip(distances, columns)):
         branches, _ = tree.grow(rng, leafy)
@@ -106,6 +107,10 @@ def make_wood(folder, seed, leafy, count):
         skin = surface.without_flutter(surface.cover(rng, branches, rest, leafy))
         trees.append((skin, rest, camera))
         seen = truth.facet_map(skin, rest, camera, np.zeros((picture.FINE * picture.HEIGHT, picture.FINE * picture.WIDTH), bool))
+        # The nearest comes first, and hides those behind it.
+        free = 255 - sum(mask.astype(int) for mask in covered.values()).clip(0, 255)
+        for name, mask in zip(covered, truth.masks(skin, seen)):
+            covered[name] = covered[name] + (mask * (free / 255)).astype(np.uint8)
         leaves = (seen >= 0) & skin.two_sided[seen]
         drawn = crown(leaves if leafy else seen >= 0, branches, camera) | dict(strokes=[trunk(rng, branches, camera)])
         drawn["strokes"][0] = dict(polyline_px=drawn["strokes"][0]["polyline_px"], trunk=True)
@@ -113,6 +118,8 @@ def make_wood(folder, seed, leafy, count):
         folder_facts.append(dict(foot_px=list(foot), distance=float(distance), height_m=float(rest.points_m[..., 1].max()),
                                  px_per_m=camera.px_per_m))
     cv2.imwrite(str(folder / "photo.jpg"), photograph(rng, background, trees[::-1]), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    for name, mask in covered.items():
+        cv2.imwrite(str(folder / name), mask)
     (folder / "truth.json").write_text(json.dumps(dict(width=picture.WIDTH, height=picture.HEIGHT, horizon_px=horizon,
                                                        trees=folder_facts)))
 

@@ -3,6 +3,7 @@
 use super::Size;
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Vector2};
+use std::ops::AddAssign;
 
 /// A place is on a piece of wood within so many of its radii, and so many pixels at 640 px picture
 /// width.
@@ -66,20 +67,17 @@ impl BranchGraph {
         level_px / self.length_px().max(f64::MIN_POSITIVE)
     }
 
-    /// For every node the length of the piece that ends in it and of all that it carries, px, and how much of
-    /// that runs level, to 3 degrees.
-    pub fn carried_px(&self) -> Vec<CarriedLength> {
-        let mut carried = vec![CarriedLength::default(); self.nodes.len()];
-        for (i, node) in self.nodes.iter().enumerate().rev() {
-            let Some(parent) = node.parent else { continue };
-            let way = node.position_px - self.nodes[parent].position_px;
-            carried[i].all_px += way.norm();
-            carried[i].level_px += if is_level(&way) { way.norm() } else { 0.0 };
-            let own = carried[i];
-            carried[parent].all_px += own.all_px;
-            carried[parent].level_px += own.level_px;
+    /// The length of the piece that ends in a node, and how much of that runs level, to 3 degrees; nothing of the
+    /// foot.
+    pub fn piece_length(&self, node: usize) -> BranchLength {
+        let Some(parent) = self.nodes[node].parent else {
+            return BranchLength::default();
+        };
+        let way = self.nodes[node].position_px - self.nodes[parent].position_px;
+        BranchLength {
+            all_px: way.norm(),
+            level_px: if is_level(&way) { way.norm() } else { 0.0 },
         }
-        carried
     }
 
     /// Length of what of the branches is at places that `is_within` holds for, px.
@@ -186,9 +184,16 @@ impl BranchGraph {
 
 /// A length of branches, px, and how much of it runs level.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CarriedLength {
+pub struct BranchLength {
     pub all_px: f64,
     pub level_px: f64,
+}
+
+impl AddAssign for BranchLength {
+    fn add_assign(&mut self, other: Self) {
+        self.all_px += other.all_px;
+        self.level_px += other.level_px;
+    }
 }
 
 fn is_level(way: &Vector2<f64>) -> bool {
@@ -256,9 +261,9 @@ mod tests {
             .nodes
             .push(WoodNode::made_up(Some(3), 90.0, 71.0));
         assert!((with_ledge.level_share() - 0.2).abs() < 1e-3);
-        let carried = with_ledge.carried_px();
-        assert!((carried[1].all_px - 250.0).abs() < 0.1 && (carried[3].all_px - 100.0).abs() < 0.1);
-        assert!((carried[3].level_px - 50.0).abs() < 0.1 && carried[2].level_px == 0.0);
+        let piece = |node: usize| with_ledge.piece_length(node);
+        assert!((piece(4).all_px - 50.0).abs() < 0.1 && piece(0) == BranchLength::default());
+        assert!((piece(4).level_px - 50.0).abs() < 0.1 && piece(2).level_px == 0.0);
         assert_eq!(BranchGraph::default().level_share(), 0.0);
         assert_eq!(fork().length_within_px(|_| false), 0.0);
         assert_eq!(fork().children(), [vec![1], vec![2, 3], vec![], vec![]]);

@@ -44,7 +44,7 @@ mod verdict;
 mod wood;
 
 pub use botany::{BotanicalBranch, BotanicalBranches, TREE, TRUNK};
-pub use branch_graph::{BranchGraph, CarriedLength, RADIUS_SHARE, WoodNode};
+pub use branch_graph::{BranchGraph, BranchLength, RADIUS_SHARE, WoodNode};
 pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, KnownMode, PointFacts, Shake, SwayFacts};
 pub use control::Control;

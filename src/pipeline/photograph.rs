@@ -184,7 +184,9 @@ pub fn see_tree(
         false => Some(crown(&drawn.crown_px, picture.size)?),
     };
     match crown {
-        Some(crown) if !strokes.is_empty() => looked.along_drawn(Attempt { crown, strokes }, both),
+        Some(crown) if !strokes.is_empty() => {
+            looked.along_drawn(Attempt::drawn(crown, strokes), both)
+        }
         crown => looked.best(&Half { crown, strokes }),
     }
 }
@@ -211,6 +213,7 @@ impl Looked<'_> {
             picture: self.picture,
             crown: &strokes.crown,
             strokes: &strokes.strokes,
+            along: strokes.along,
             leaves: self.options.leaves,
             trace_by: self.options.trace_by,
         }
@@ -220,7 +223,7 @@ impl Looked<'_> {
     fn see_beside(&self, leaves: &LeavesSeen, strokes: Attempt) -> Result<TreeInPhoto, PhotoError> {
         let seen = wood::beside_leaves(self.view(&strokes), leaves, self.cancel)
             .map_err(|e| not_seen(e, self.drawn))?;
-        let Attempt { crown, strokes } = strokes;
+        let Attempt { crown, strokes, .. } = strokes;
         let branches = &seen.wood.branches;
         let size = self.picture.size;
         for (number, stroke) in (1..).zip(&strokes) {

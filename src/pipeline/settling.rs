@@ -12,7 +12,7 @@ use crate::cancel::CancelToken;
 use crate::model::Rgb;
 use crate::outline::Reduced;
 use crate::signal::distance_to_segment;
-use crate::wood::{self, LeavesSeen, NotSeen, SeenInPhotograph, Stroke};
+use crate::wood::{self, LeavesSeen, NotSeen, SeenInPhotograph, Stroke, length_px};
 use nalgebra::Point2;
 
 /// Width to which photographs are reduced for this, px.
@@ -113,10 +113,7 @@ impl<'a> Settling<'a> {
                 .strokes
                 .first()
                 .is_none_or(|line| lies_on(&way_px, line, STAYS_PX));
-            match small.strokes.first_mut() {
-                Some(trunk) => *trunk = way_px,
-                None => small.strokes.push(way_px),
-            }
+            small = small.along(way_px);
             if stays {
                 break;
             }
@@ -142,7 +139,11 @@ impl<'a> Settling<'a> {
                     .collect(),
             );
         }
-        Ok(crown.map(|crown| Attempt { crown, strokes }))
+        Ok(crown.map(|crown| Attempt {
+            crown,
+            strokes,
+            along: attempt.along,
+        }))
     }
 
     fn photo<'b>(&'b self, small: &'b Attempt) -> wood::Photograph<'b> {
@@ -150,6 +151,7 @@ impl<'a> Settling<'a> {
             picture: &self.reduced.picture,
             crown: &small.crown,
             strokes: &small.strokes,
+            along: small.along,
             leaves: self.options.leaves,
             trace_by: self.options.trace_by,
         }
@@ -172,10 +174,6 @@ pub fn lies_on(line: &Stroke, other: &Stroke, within_px: f64) -> bool {
         let mut pieces = other.windows(2);
         pieces.any(|ends| distance_to_segment(*at, ends[0], ends[1]) <= within_px)
     })
-}
-
-fn length_px(line: &Stroke) -> f64 {
-    line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
 }
 
 #[cfg(test)]

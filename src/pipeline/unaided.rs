@@ -3,7 +3,7 @@
 use super::photograph::{PhotoError, failed};
 use crate::model::{Outline, Rgb};
 use crate::outline::{self, Margin, Reduced};
-use crate::wood::{self, LeafColour, LeafHint, Stroke};
+use crate::wood::{self, LeafColour, LeafHint, Stroke, StrokesAlong};
 
 /// Gaps between leaves up to this are closed, px of the reduced picture, and a crown of leaves covers so
 /// great a share of it at least.
@@ -16,12 +16,26 @@ pub struct Attempt {
     pub crown: Outline,
     /// The trunk's first, from its foot up.
     pub strokes: Vec<Stroke>,
+    pub along: StrokesAlong,
 }
 
 impl Attempt {
-    /// The same with another line for the trunk.
+    /// Of a crown and of strokes that were drawn.
+    pub fn drawn(crown: Outline, strokes: Vec<Stroke>) -> Self {
+        Self {
+            crown,
+            strokes,
+            along: StrokesAlong::Drawn,
+        }
+    }
+
+    /// The same with a trunk along wood that was found.
     pub fn along(mut self, trunk: Stroke) -> Self {
-        self.strokes[0] = trunk;
+        match self.strokes.first_mut() {
+            Some(drawn) => *drawn = trunk,
+            None => self.strokes.push(trunk),
+        }
+        self.along = StrokesAlong::Wood;
         self
     }
 }
@@ -93,18 +107,21 @@ impl Half {
         reduced: &Reduced,
         crown: &Outline,
     ) -> Result<Option<Attempt>, PhotoError> {
-        let mut strokes = self.strokes.clone();
-        if strokes.is_empty() {
-            let Some(trunk) = outline::stem(&reduced.picture, crown) else {
-                return Ok(None);
-            };
-            strokes.push(trunk.into_iter().map(|at| reduced.to_whole(at)).collect());
-        }
+        let drawn = Attempt::drawn(crown.clone(), self.strokes.clone());
+        let attempt = match self.strokes.is_empty() {
+            true => {
+                let Some(trunk) = outline::stem(&reduced.picture, crown) else {
+                    return Ok(None);
+                };
+                drawn.along(trunk.into_iter().map(|at| reduced.to_whole(at)).collect())
+            }
+            false => drawn,
+        };
         let whole = match &self.crown {
             Some(drawn) => Some(drawn.clone()),
             None => reduced.outline_in_whole(crown).map_err(failed)?,
         };
-        Ok(whole.map(|crown| Attempt { crown, strokes }))
+        Ok(whole.map(|crown| Attempt { crown, ..attempt }))
     }
 }
 

@@ -135,7 +135,7 @@ fn side_strokes(tree: &Skeleton, is_side: &[bool]) -> BTreeMap<usize, SideStroke
 }
 
 /// From a node's parent to the node, in the picture.
-fn piece_px(tree: &Skeleton, i: usize) -> f64 {
+pub(super) fn piece_px(tree: &Skeleton, i: usize) -> f64 {
     let node = &tree.nodes[i];
     let below = node.parent.map_or(node, |p| &tree.nodes[p.index()]);
     (node.position - below.position).xy().norm()

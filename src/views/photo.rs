@@ -140,9 +140,14 @@ impl PhotoTree {
             .map(|s| s.iter().map(|p| [p.x, p.y]).collect());
         config.skeleton.strokes_px = lines.collect();
         let mut tree = DrawnTree::new(parts.name.to_owned(), &flat, &region, config)?;
-        if growth.depth == PhotoDepth::Apart {
-            let trunk = on_trunk(&tree.skeleton, &flat);
-            shape::set_depths_apart(&mut tree.skeleton, &trunk);
+        match growth.depth {
+            // Leaves hide how limbs go, and grown branches fill the crown better from limbs to all sides.
+            PhotoDepth::Push if in_leaf => {}
+            PhotoDepth::Push => shape::make_depths_even(&mut tree.skeleton),
+            PhotoDepth::Apart => {
+                let trunk = on_trunk(&tree.skeleton, &flat);
+                shape::set_depths_apart(&mut tree.skeleton, &trunk);
+            }
         }
         let seed = tree.note.config.wood.seed.into();
         let mut grown = Growth::default();

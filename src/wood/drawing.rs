@@ -1,7 +1,7 @@
 //! Lines that are drawn into masks.
 
-use super::Stroke;
 use super::mask::WoodMask;
+use super::{Stroke, length_px};
 use crate::model::Size;
 use nalgebra::Point2;
 use opencv::core::{CV_8U, Mat, Point, Scalar, Vector};
@@ -14,6 +14,24 @@ pub(super) const STROKE_PX: i32 = 2;
 const FARTHEST: f64 = 30_000.0;
 /// Places of lines are given to OpenCV in parts of a pixel, so many bits of them.
 const PIXEL_BITS: i32 = 4;
+
+/// The line from its beginning on, to this share of its length.
+pub(super) fn lower_part(line: &Stroke, share: f64) -> Stroke {
+    let mut left_px = share * length_px(line);
+    let mut part = Stroke::new();
+    part.extend(line.first());
+    for ends in line.windows(2) {
+        let way = ends[1] - ends[0];
+        let length_px = way.norm();
+        if length_px >= left_px {
+            part.push(ends[0] + way * (left_px / length_px.max(f64::MIN_POSITIVE)));
+            break;
+        }
+        part.push(ends[1]);
+        left_px -= length_px;
+    }
+    part
+}
 
 /// Which pixels of the mask `wood` the strokes are drawn on.
 pub(super) fn drawn(strokes: &[Stroke], wood: &WoodMask) -> opencv::Result<Vec<bool>> {
@@ -49,4 +67,22 @@ pub(super) fn draw_line(
         corners.push(Point::new(u, v));
     }
     polylines(mask, &corners, false, colour, width_px, LINE_8, PIXEL_BITS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lower_part_of_a_line_is_cut_at_its_share_of_the_length() {
+        let line = [(0.0, 30.0), (0.0, 20.0), (10.0, 20.0), (10.0, 10.0)];
+        let line: Stroke = line.map(|(u, v)| Point2::new(u, v)).to_vec();
+        let half = [(0.0, 30.0), (0.0, 20.0), (5.0, 20.0)];
+        let half: Stroke = half.map(|(u, v)| Point2::new(u, v)).to_vec();
+        assert_eq!(lower_part(&line, 0.5), half);
+        assert_eq!(lower_part(&line, 1.0), line);
+        assert_eq!(lower_part(&Stroke::new(), 0.5), Stroke::new());
+        let point = vec![Point2::new(3.0, 4.0)];
+        assert_eq!(lower_part(&point, 0.5), point);
+    }
 }

@@ -40,7 +40,7 @@ mod ways;
 pub use foliage::{LeafColour, LeafHint};
 pub use greenery::greenery;
 pub use photograph::{
-    BESIDE_STROKE, LeavesSeen, NotSeen, Photograph, SeenInPhotograph, beside_leaves,
+    BESIDE_STROKE, LeavesSeen, NotSeen, Photograph, SeenInPhotograph, StrokesAlong, beside_leaves,
 };
 
 use crate::cancel::CancelToken;
@@ -107,6 +107,11 @@ pub struct Shot<'a> {
 
 /// A line that the user drew along a branch, px.
 pub type Stroke = Vec<Point2<f64>>;
+
+/// The length of a line, px.
+pub fn length_px(line: &Stroke) -> f64 {
+    line.windows(2).map(|ends| (ends[1] - ends[0]).norm()).sum()
+}
 
 /// What to look for wood in.
 #[derive(Clone, Copy, Debug)]

@@ -18,7 +18,7 @@ use super::stroke_colours::StrokeColours;
 use super::{Stroke, bark, circles, crown, faint, paths, probability, ways, widened};
 use crate::cancel::CancelToken;
 use crate::config::TraceBy;
-use crate::model::{AtRest, BranchGraph, Luma, Masks, Outline, Rgb, Size, Wood};
+use crate::model::{AtRest, BranchGraph, BranchLength, Luma, Masks, Outline, Rgb, Size, Wood};
 use crate::signal::{convex_hull, median};
 use nalgebra::Point2;
 use opencv::core::{Mat, Point, Scalar, Vec3b, Vector};
@@ -55,6 +55,15 @@ const WALL_CARRIES: f64 = 0.5;
 /// Where so great a share of a piece of a branch is leaves, its width is not seen.
 const HIDDEN: f64 = 0.5;
 
+/// What the strokes on a photograph follow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StrokesAlong {
+    /// Branches as a hand draws them: high in a crown it is beside the wood now and then.
+    Drawn,
+    /// The middle of wood that was found.
+    Wood,
+}
+
 /// A photograph and what was drawn on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Photograph<'a> {
@@ -63,6 +72,7 @@ pub struct Photograph<'a> {
     pub crown: &'a Outline,
     /// Lines along branches, px, the trunk's first, from its foot up; one at least.
     pub strokes: &'a [Stroke],
+    pub along: StrokesAlong,
     /// What is known of the leaves before.
     pub leaves: LeafHint,
     pub trace_by: TraceBy,
@@ -336,7 +346,7 @@ fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<
 /// is not in the picture.
 fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
     let mut radii = Vec::new();
-    for ends in trunk.windows(2) {
+    for ends in drawing::lower_part(trunk, 0.5).windows(2) {
         let way = ends[1] - ends[0];
         let count = way.norm().ceil().max(1.0) as usize;
         for step in 0..count {
@@ -345,7 +355,6 @@ fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
             radii.extend(pixel.map(|pixel| inside_px[middle_of_wood(pixel, inside_px, size)]));
         }
     }
-    radii.truncate(radii.len().div_ceil(2));
     median(radii, f32::total_cmp)
 }
 
@@ -408,24 +417,27 @@ fn without_roots(branches: &BranchGraph) -> BranchGraph {
 }
 
 /// The branches without those off the strokes of which much runs level, with all that they carry: edges of
-/// walls and rows of windows. What carries half of the tree is none.
+/// walls and rows of windows. What carries half of the tree is none. From the tips down, so that a limb
+/// which such an edge hangs on is judged without it.
 fn without_walls(branches: &BranchGraph, is_stroke: &[bool], size: Size) -> BranchGraph {
-    let carried = branches.carried_px();
     let all_px = branches.length_px();
     let mut leads_to_stroke = vec![false; branches.nodes.len()];
+    let mut is_kept = vec![true; branches.nodes.len()];
+    let mut carried = vec![BranchLength::default(); branches.nodes.len()];
     for (i, node) in branches.nodes.iter().enumerate().rev() {
+        let Some(parent) = node.parent else { continue };
         let pixel = size.pixel_at(node.position_px);
         leads_to_stroke[i] |= pixel.is_some_and(|pixel| is_stroke[pixel]);
-        if let (Some(parent), true) = (node.parent, leads_to_stroke[i]) {
-            leads_to_stroke[parent] = true;
+        leads_to_stroke[parent] |= leads_to_stroke[i];
+        carried[i] += branches.piece_length(i);
+        let own = carried[i];
+        let is_wall = own.level_px > WALL_LEVEL * own.all_px
+            && own.level_px > WALL_LENGTH * all_px
+            && own.all_px < WALL_CARRIES * all_px;
+        is_kept[i] = leads_to_stroke[i] || !is_wall;
+        if is_kept[i] {
+            carried[parent] += own;
         }
-    }
-    let mut is_kept = Vec::with_capacity(branches.nodes.len());
-    for (carried, leads_to_stroke) in carried.iter().zip(leads_to_stroke) {
-        let is_wall = carried.level_px > WALL_LEVEL * carried.all_px
-            && carried.level_px > WALL_LENGTH * all_px
-            && carried.all_px < WALL_CARRIES * all_px;
-        is_kept.push(leads_to_stroke || !is_wall);
     }
     branches.of_nodes(&is_kept)
 }
@@ -587,6 +599,7 @@ mod tests {
             picture,
             crown: &crown,
             strokes,
+            along: StrokesAlong::Drawn,
             leaves: LeafHint::Unknown,
             trace_by: TraceBy::Paths,
         };

@@ -1,14 +1,18 @@
 //! The colours on what is drawn on a photograph and those of all else, and whether what is drawn is on
 //! anything.
 
+use super::Stroke;
 use super::colours::Colours;
 use super::contrast::{self, Along};
+use super::drawing::{self, lower_part};
 use super::mixture::{LogRatio, Mixture};
-use super::photograph::{NotSeen, PARTS, Photograph};
+use super::photograph::{NotSeen, PARTS, Photograph, StrokesAlong};
 use nalgebra::Vector3;
 
 /// Fewer colours than this on the strokes show no bark.
 const LEAST_BARK: f64 = 64.0;
+/// Bark is looked for in so great a part of a stroke, from below.
+const LOW: f64 = 0.5;
 /// The colours on the strokes are bark if their odds against all else are this at least in their mean, as
 /// a logarithm; elsewhere there is nothing to see.
 const LEAST_TOLD: f64 = 0.5;
@@ -47,10 +51,7 @@ impl StrokeColours {
         region: &[u8],
         is_leaf: &[bool],
     ) -> Result<Self, NotSeen> {
-        let on_strokes = Colours::of(photo.picture, |i| is_stroke[i] && !is_leaf[i]);
-        if on_strokes.count() < LEAST_BARK {
-            return Err(NotSeen::Wood);
-        }
+        let on_strokes = bark_of(photo, &is_stroke, is_leaf)?;
         let others = Colours::of(photo.picture, |i| region[i] == 0 || is_leaf[i]);
         let mut own = Self {
             is_stroke,
@@ -106,6 +107,29 @@ impl StrokeColours {
         contrast::along(&photo.strokes[number], size, hides, off_px, |at| {
             Some(self.odds(&photo.picture.interpolated(at)?))
         })
+    }
+}
+
+/// The colours on the strokes that are of bark: those of the lower part of drawn ones, as far as it shows enough. What
+/// is beside the wood high in the crown would be taken for bark, too.
+///
+/// # Errors
+/// The strokes show too little bark, or OpenCV fails.
+fn bark_of(photo: Photograph, is_stroke: &[bool], is_leaf: &[bool]) -> Result<Colours, NotSeen> {
+    let bark_on = |is_line: &[bool]| Colours::of(photo.picture, |i| is_line[i] && !is_leaf[i]);
+    if photo.along == StrokesAlong::Drawn {
+        let strokes = photo.strokes.iter();
+        let low: Vec<Stroke> = strokes.map(|stroke| lower_part(stroke, LOW)).collect();
+        let is_low = drawing::on_lines(&low, photo.picture.size, drawing::STROKE_PX)?;
+        let colours = bark_on(&is_low);
+        if colours.count() >= LEAST_BARK {
+            return Ok(colours);
+        }
+    }
+    let colours = bark_on(is_stroke);
+    match colours.count() < LEAST_BARK {
+        true => Err(NotSeen::Wood),
+        false => Ok(colours),
     }
 }
 
