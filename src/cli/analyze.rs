@@ -12,7 +12,7 @@ use crate::config::{Config, ConfigError, Excited};
 use crate::document::{Document, DocumentError, MarkedTree};
 use crate::dynamics::{Depth, Film, Take, analyse};
 use crate::export::picture::data_address;
-use crate::files::refuse_taken;
+use crate::files::check_place;
 use crate::model::{Excitation, FilmCut, Lens, NodeName, Pose, Skeleton, Swaying, TreeMode};
 use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
 use crate::tui::columns;
@@ -47,7 +47,7 @@ struct Found {
 pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     args.check()?;
     if let Some(path) = &args.report {
-        refuse_taken(path)?;
+        check_place(path)?;
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);

@@ -20,7 +20,7 @@ use crate::animate::{
 use crate::document::{DocumentError, ForestDocument, MotionCsv};
 use crate::export::gltf::{NamedBytes, glb, gltf_files};
 use crate::export::{ExportError, html};
-use crate::files::{refuse_taken, write_files};
+use crate::files::{check_place, write_files};
 use crate::model::{NodeId, Pose};
 use crate::tui;
 use crate::views::{PreparedTree, Shot};
@@ -44,7 +44,7 @@ pub fn run(args: &AnimateArgs) -> Result<(), CommandError> {
     let kind = args
         .check(out)
         .map_err(|why| CommandError::BadUsage(anyhow!(why)))?;
-    refuse_taken(out).map_err(write_error)?;
+    check_place(out).map_err(write_error)?;
     if kind == Kind::Html {
         html::built_in()?;
     }
@@ -106,9 +106,10 @@ fn prepare_tree(args: &AnimateArgs) -> Result<PreparedTree, CommandError> {
         Some(_) => Tail::Whole,
         None => Tail::Seconds(0.0),
     };
-    let tree = args
+    let mut tree = args
         .tree
         .prepare(&args.dir, tail, |config| args.set(config))?;
+    args.height.set(&mut tree);
     if args.magnify.is_some() && !tree.document.has_motion() {
         return Err(DocumentError::NoFilm {
             dir: args.dir.clone(),

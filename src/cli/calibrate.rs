@@ -6,7 +6,7 @@ use super::stop::Stop;
 use crate::calibrate::{Board, BoardViews, Calibration, calibrate, find_board};
 use crate::config::Config;
 use crate::export::lens_profile::lens_profile;
-use crate::files::{OutputFile, refuse_taken};
+use crate::files::{OutputFile, check_place};
 use crate::model::{Luma, Size};
 use crate::source::{self, DecodeError, Decoder, Source};
 use anyhow::{Context, anyhow};
@@ -49,7 +49,7 @@ fn parse_squares(text: &str) -> Result<Board, String> {
 }
 
 pub fn run(args: &CalibrateArgs) -> Result<(), CommandError> {
-    refuse_taken(&args.out)?;
+    check_place(&args.out)?;
     let stop = Stop::on_signals()?;
     let config = Config::default().layered(args.config.as_deref(), |_| ())?;
     // Each picture of a folder is looked at.

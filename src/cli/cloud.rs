@@ -12,7 +12,7 @@ use super::unused;
 use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud, verdict};
 use crate::config::Config;
 use crate::document::Document;
-use crate::files::refuse_taken;
+use crate::files::check_place;
 use crate::import::{CloudFormat, CloudRead, ImportError, Units, cover_px, read_cloud};
 use crate::model::PointCloud;
 use crate::outline;
@@ -32,6 +32,8 @@ use std::sync::atomic::AtomicBool;
 /// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
 /// that.
 const TALL_M: f64 = 60.0;
+/// A place on a tree is no farther off its wood than this, as a share of the tree's size.
+const BESIDE_TREE: f64 = 0.2;
 /// Radii of twigs that may be given, mm.
 const TWIG_RADII_MM: std::ops::RangeInclusive<f64> = 0.1..=100.0;
 
@@ -130,7 +132,7 @@ fn twig_radius(text: &str) -> Result<f64, String> {
 }
 
 pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
-    refuse_taken(&args.out)?;
+    check_place(&args.out)?;
     let stop = Stop::on_signals()?;
     let config = scan_defaults().layered(args.config.as_deref(), |config| {
         config.wood.seed = args.seed;
@@ -335,7 +337,16 @@ impl CloudArgs {
             + scan.cloud.origin;
         let mut pairs = self.pairs.clone();
         for pair in pairs.iter_mut().flat_map(|pairs| &mut pairs.0) {
-            pair.scan = scan.metres(&pair.scan) - foot;
+            let given = pair.scan;
+            pair.scan = scan.metres(&given) - foot;
+            if !is_at(tree, &pair.scan) {
+                return Err(CommandError::Failed(anyhow!(
+                    "--pairs: {}, {}, {} lies off the tree of the scan; give places on it, in the unit of the scan",
+                    given.x,
+                    given.y,
+                    given.z
+                )));
+            }
         }
         let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
         let fit = register_film(tree, film, pairs).filter(FilmFit::holds);
@@ -360,6 +371,21 @@ impl CloudArgs {
         let has_tag = film.note.tag.is_some();
         Ok(FilmOnScan { fit, sway, has_tag })
     }
+}
+
+/// Whether a place, m from the foot, is not far off the tree: what was left out as leaves reaches farther than
+/// the wood.
+fn is_at(tree: &CloudTree, place: &Point3<f64>) -> bool {
+    let Some(foot) = tree.nodes.first().map(|node| node.position) else {
+        return false;
+    };
+    let ways = tree.nodes.iter().map(|node| node.position - foot);
+    let (low, high) = ways.fold((Vector3::zeros(), Vector3::zeros()), |(low, high), way| {
+        (low.inf(&way), high.sup(&way))
+    });
+    let margin = Vector3::repeat(BESIDE_TREE * (high - low).max());
+    let nearest = place.coords.sup(&(low - margin)).inf(&(high + margin));
+    nearest == place.coords
 }
 
 /// How well a film lies on a scan.
@@ -442,4 +468,39 @@ fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
         figures.percent(figures.noise),
     ));
     eprint_line(&verdict(&figures).labelled_line());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::{CloudFigures, CloudNode};
+
+    #[test]
+    fn a_place_is_at_a_tree_or_off_it() {
+        let node = |parent, z| CloudNode {
+            parent,
+            position: Point3::new(3.0, 4.0, z),
+            radius: 0.1,
+            is_measured: true,
+        };
+        let tree = CloudTree {
+            nodes: vec![node(None, 1.0), node(Some(0), 11.0)],
+            figures: CloudFigures::default(),
+        };
+        for (place, expected) in [
+            ([0.0, 0.0, 10.0], true),
+            ([1.5, -1.5, 5.0], true),
+            ([0.0, 0.0, 13.0], false),
+            ([20.0, 0.0, 5.0], false),
+        ] {
+            assert_eq!(is_at(&tree, &Point3::from(place)), expected, "{place:?}");
+        }
+        assert!(!is_at(
+            &CloudTree {
+                nodes: Vec::new(),
+                ..tree
+            },
+            &Point3::origin()
+        ));
+    }
 }

@@ -2,7 +2,8 @@
 
 use super::command_error::CommandError;
 use super::common::parse_within;
-use super::output::eprint_line;
+use super::output::{eprint_line, print_bytes};
+use super::scale::HeightArgs;
 use super::stop::Stop;
 use super::tree::{Tail, TreeArgs, print_warnings};
 use super::unused;
@@ -10,11 +11,10 @@ use crate::document::ForestDocument;
 use crate::export::gltf::{KEY_TOLERANCE_PX, LEVELS_OF_DETAIL, Model, NamedBytes, glb, gltf_files};
 use crate::export::still::{obj_files, ply};
 use crate::export::{ExportError, html};
-use crate::files::{WriteError, refuse_taken, write_files};
+use crate::files::{WriteError, check_place, write_files};
 use crate::views::{PreparedForest, PreparedTree};
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Value of `--out` for standard output.
@@ -43,9 +43,8 @@ pub struct ExportArgs {
     /// NAME_lod1, NAME_lod2 with the same bones and motion (glb, gltf).
     #[arg(long)]
     lods: bool,
-    /// Height of the tree, m, where no scale is known: lengths are then in metres.
-    #[arg(long, value_name = "M", value_parser = height)]
-    height: Option<f64>,
+    #[command(flatten)]
+    height: HeightArgs,
     #[command(flatten)]
     tree: TreeArgs,
 }
@@ -61,7 +60,7 @@ impl ExportArgs {
                     .into(),
             );
         }
-        if self.tree.is_given() || self.height.is_some() {
+        if self.tree.is_given() || self.height.is_given() {
             return bad_usage("the options of the tree do not go with a forest".into());
         }
         Ok(())
@@ -111,15 +110,6 @@ impl Format {
     }
 }
 
-/// Parses `--height`, m.
-fn height(text: &str) -> Result<f64, String> {
-    parse_within(
-        text,
-        1e-3..=1e4,
-        "give a number of metres from 0.001 to 10000",
-    )
-}
-
 /// Parses `--tolerance-px`, px.
 fn tolerance(text: &str) -> Result<f64, String> {
     parse_within(
@@ -131,7 +121,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
 
 pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
     let target = Target::of(args)?;
-    target.refuse_taken()?;
+    target.check_place()?;
     if args.format == Format::Html {
         html::built_in()?;
     }
@@ -144,11 +134,7 @@ pub fn run(args: &ExportArgs) -> Result<(), CommandError> {
     let mut tree = args.tree.prepare(&args.dir, Tail::Animation, |_| {})?;
     print_warnings(&tree);
     args.note_unused();
-    if let Some(height_m) = args.height
-        && !tree.set_height(height_m)
-    {
-        unused::note("--height", "the scale of the tree is known");
-    }
+    args.height.set(&mut tree);
     if args.format == Format::Csv {
         return write_tables(args, &tree, &stop);
     }
@@ -316,10 +302,10 @@ impl<'a> Target<'a> {
     }
 
     /// Checks, before anything is computed, that the file does not exist.
-    fn refuse_taken(&self) -> Result<(), WriteError> {
+    fn check_place(&self) -> Result<(), WriteError> {
         match self {
             Self::Stdout => Ok(()),
-            Self::File(path) => refuse_taken(path),
+            Self::File(path) => check_place(path),
         }
     }
 
@@ -327,14 +313,8 @@ impl<'a> Target<'a> {
     fn write(&self, files: Vec<NamedBytes>, stop: &Stop) -> Result<(), CommandError> {
         match self {
             Self::Stdout => {
-                let mut out = std::io::stdout().lock();
-                let written = files
-                    .iter()
-                    .try_for_each(|(_, bytes)| out.write_all(bytes))
-                    .and_then(|()| out.flush());
-                written.map_err(|e| {
-                    CommandError::Failed(anyhow!("cannot write to standard output: {e}"))
-                })
+                let bytes: Vec<&[u8]> = files.iter().map(|(_, bytes)| &bytes[..]).collect();
+                print_bytes(&bytes)
             }
             Self::File(path) => {
                 let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();

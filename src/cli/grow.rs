@@ -9,7 +9,7 @@ use super::output::eprint_line;
 use super::shape::read_drawn;
 use super::stop::Stop;
 use crate::document::Document;
-use crate::files::refuse_taken;
+use crate::files::check_place;
 use crate::grow::Resampling;
 use crate::model::Outline;
 use crate::outline;
@@ -96,7 +96,7 @@ fn threshold(text: &str) -> Result<f64, String> {
 
 pub fn run(args: &GrowArgs) -> Result<(), CommandError> {
     let likeness = args.likeness()?;
-    refuse_taken(&args.out)?;
+    check_place(&args.out)?;
     let stop = Stop::on_signals()?;
     let Example { document, config } = Example::read(&args.example, args.config.as_deref())?;
     let motion = args.motion(&document);

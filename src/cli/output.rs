@@ -10,9 +10,17 @@ use std::io::{ErrorKind, Write};
 /// # Errors
 /// Standard output cannot be written for another reason.
 pub fn print(text: &str) -> Result<(), CommandError> {
+    print_bytes(&[text.as_bytes()])
+}
+
+/// The same with bytes, one part after the other.
+///
+/// # Errors
+/// As of [`print`].
+pub fn print_bytes(parts: &[&[u8]]) -> Result<(), CommandError> {
     let mut out = std::io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    match written {
+    let written = parts.iter().try_for_each(|part| out.write_all(part));
+    match written.and_then(|()| out.flush()) {
         Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(CommandError::Failed(anyhow!(
             "cannot write to standard output: {e}"
         ))),

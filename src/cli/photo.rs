@@ -14,7 +14,7 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use crate::cancel::CancelToken;
 use crate::export::gltf::NamedBytes;
-use crate::files::{refuse_taken, write_folder};
+use crate::files::{check_place, write_folder};
 use crate::grow::SubtreeKind;
 use crate::pipeline::{PhotoError, PhotoOptions, TreeInPhoto, see_tree};
 use crate::runtime::AtOnce;
@@ -157,7 +157,7 @@ impl From<Foliage> for LeafHint {
 }
 
 pub fn run(args: &PhotoArgs) -> Result<(), CommandError> {
-    refuse_taken(&args.out)?;
+    check_place(&args.out)?;
     let config = photo_defaults().layered(args.config.as_deref(), |config| {
         (config.wood.seed, config.wind.seed) = (args.seed, args.seed);
     })?;
@@ -250,6 +250,12 @@ impl PhotoArgs {
                 "--horizon: the foot of a tree is not below that row; give a row above all feet"
             ))
         })?;
+        if horizon_px.is_none() {
+            eprint_line(
+                "arborcam: note: the horizon is not known, and taken for the picture's middle row, or just above the \
+                 feet; how far and how large the trees are hangs on it: give --horizon",
+            );
+        }
         Ok(photo_forest(&shown.name, trees, &places, tree_name))
     }
 }

@@ -9,7 +9,7 @@ use super::output::eprint_line;
 use super::stop::Stop;
 use super::tree::{Tail, print_warnings};
 use crate::document::ForestDocument;
-use crate::files::{OutputFile, WriteError, refuse_taken};
+use crate::files::{OutputFile, WriteError, check_place};
 use crate::views::{
     ForestStudio, PrepareError, PreparedForest, PreparedTree, Shot, Studio, VIDEO_S,
 };
@@ -28,7 +28,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CommandError> {
             "--seconds is more than {MAX_VIDEO_S}; give less"
         )));
     }
-    refuse_taken(&args.out).map_err(write_error)?;
+    check_place(&args.out).map_err(write_error)?;
     let stop = Stop::on_signals()?;
     if ForestDocument::is_in(&args.dir) {
         args.check_forest()

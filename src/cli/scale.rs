@@ -1,8 +1,11 @@
 //! The scale of the picture at the tree, m/px.
 
 use super::command_error::CommandError;
+use super::common::parse_within;
+use super::unused;
 use crate::config::Config;
 use crate::model::Size;
+use crate::views::PreparedTree;
 use anyhow::anyhow;
 use clap::Args;
 use nalgebra::Point2;
@@ -22,6 +25,38 @@ pub struct ScaleArgs {
     /// and their distance at the tree, m, e.g. 310,340:305,80=2.6
     #[arg(long, value_name = "U,V:U,V=METRES", value_parser = length, conflicts_with = "metres_per_px")]
     scale: Option<Known>,
+}
+
+/// The height of a tree whose scale no film tells.
+#[derive(Clone, Debug, Default, Args)]
+pub struct HeightArgs {
+    /// Height of the tree, m, where no scale is known: lengths are then in metres.
+    #[arg(long, value_name = "M", value_parser = height)]
+    height: Option<f64>,
+}
+
+impl HeightArgs {
+    pub fn is_given(&self) -> bool {
+        self.height.is_some()
+    }
+
+    /// Gives a tree the height, and says so where that changes nothing.
+    pub fn set(&self, tree: &mut PreparedTree) {
+        if let Some(height_m) = self.height
+            && !tree.set_height(height_m)
+        {
+            unused::note("--height", "the scale of the tree is known");
+        }
+    }
+}
+
+/// Parses `--height`, m.
+fn height(text: &str) -> Result<f64, String> {
+    parse_within(
+        text,
+        1e-3..=1e4,
+        "give a number of metres from 0.001 to 10000",
+    )
 }
 
 /// A known length in the picture.

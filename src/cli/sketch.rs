@@ -6,7 +6,7 @@ use super::example::{read_drawing, stood_up};
 use super::output::eprint_line;
 use super::stop::Stop;
 use crate::config::Config;
-use crate::files::refuse_taken;
+use crate::files::check_place;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub struct SketchArgs {
 }
 
 pub fn run(args: &SketchArgs) -> Result<(), CommandError> {
-    refuse_taken(&args.out)?;
+    check_place(&args.out)?;
     let stop = Stop::on_signals()?;
     let config = Config::default().layered(args.config.as_deref(), |config| {
         if let Some(planes) = args.planes {

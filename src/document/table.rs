@@ -5,7 +5,7 @@
 
 use super::error::DocumentError;
 use super::number;
-use crate::files::WriteError;
+use crate::files::{TableFault, WriteError};
 use crate::model::{FARTHEST_PX, NodeName};
 use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};
 use nalgebra::Point3;
@@ -193,6 +193,18 @@ impl<R: Read, const N: usize> TableReader<R, N> {
             .map_err(|e| explain(&self.file, e))
     }
 
+    /// # Errors
+    /// The row has fewer cells than the first line: the file was cut off.
+    pub fn refuse_short(&self) -> Result<(), DocumentError> {
+        let (cells, columns) = (self.row.len(), self.header.len());
+        match cells < columns {
+            true => Err(self.bad(format!(
+                "it has {cells} cells, and the first line {columns}"
+            ))),
+            false => Ok(()),
+        }
+    }
+
     /// The cell of the `i`-th column that was asked for; empty where the row is too short.
     pub fn cell(&self, i: usize) -> &str {
         self.row.get(self.columns[i]).unwrap_or("")
@@ -288,19 +300,12 @@ impl<R: Read, const N: usize> TableReader<R, N> {
 }
 
 fn explain(file: &Path, e: csv::Error) -> DocumentError {
-    let line = e.position().map_or(1, Position::line);
+    let TableFault { line, what } = TableFault::from(&e);
     match e.into_kind() {
         ErrorKind::Io(source) => DocumentError::Unreadable {
             file: file.to_owned(),
             source,
         },
-        ErrorKind::Utf8 { .. } => DocumentError::row(file, line, "it is no text"),
-        ErrorKind::UnequalLengths {
-            expected_len, len, ..
-        } => {
-            let what = format!("it has {len} cells, and the first line {expected_len}");
-            DocumentError::row(file, line, what)
-        }
-        _ => DocumentError::row(file, line, "it cannot be read as a table"),
+        _ => DocumentError::row(file, line, what),
     }
 }

@@ -369,6 +369,7 @@ impl<'a> TracksReader<'a> {
         if !table.next()? {
             return Ok(None);
         }
+        table.refuse_short()?;
         // A point that is nowhere has no place, as it was not seen.
         let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
         let mut row = TrackRow {
@@ -495,6 +496,13 @@ mod tests {
         write(LEFT_OUT_FILE, "2,2,0.2,8,8,7\n2,0,0,8,9,7\n");
         let reordered = read().unwrap_err().to_string();
         assert!(reordered.contains(LEFT_OUT_FILE), "{reordered}");
+        // Cut off in the middle of a line.
+        write(LEFT_OUT_FILE, "2,0,0,8,9,7\n2,1,0.1,8\n");
+        let cut = read().unwrap_err().to_string();
+        assert!(
+            cut.contains("line 3") && cut.contains("it has 4 cells, and the first line 6"),
+            "{cut}"
+        );
     }
 
     #[test]

@@ -33,7 +33,7 @@ impl Place {
         make: fn(&Path) -> io::Result<()>,
         remove: fn(&Path) -> io::Result<()>,
     ) -> Result<Self, WriteError> {
-        refuse_taken(path)?;
+        check_place(path)?;
         let name = path
             .file_name()
             .ok_or_else(|| no_name(path))?
@@ -117,15 +117,26 @@ impl Drop for Place {
     }
 }
 
+/// Whether something can be written at `path`, to be known before any work is done for it.
+///
 /// # Errors
-/// There is something at `path`: a file, a folder, or a link, be it one that leads nowhere.
-pub fn refuse_taken(path: &Path) -> Result<(), WriteError> {
+/// There is something: a file, a folder, or a link, be it one that leads nowhere. Or nothing may be
+/// written in the folder above, or in the first one above that which is there.
+pub fn check_place(path: &Path) -> Result<(), WriteError> {
     // Not `exists()`: that is false for a link to nowhere.
     match fs::symlink_metadata(path) {
-        Ok(_) => Err(WriteError::Exists {
-            path: path.to_path_buf(),
-        }),
-        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
+        Ok(_) => {
+            return Err(WriteError::Exists {
+                path: path.to_path_buf(),
+            });
+        }
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {}
+        Err(e) => return Err(failed(path, e)),
+    }
+    let folder = above(path).ancestors().find(|folder| folder.is_dir());
+    // Permissions alone do not tell: a file system may be read-only, or no place for files.
+    match tempfile::tempfile_in(folder.unwrap_or(Path::new("."))) {
+        Ok(_) => Ok(()),
         Err(e) => Err(failed(path, e)),
     }
 }
@@ -179,6 +190,19 @@ fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_place_where_nothing_can_be_written_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(check_place(&dir.path().join("new")).is_ok());
+        assert!(check_place(&dir.path().join("not/there/yet")).is_ok());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
+        assert!(matches!(
+            check_place(dir.path()),
+            Err(WriteError::Exists { .. })
+        ));
+        assert!(check_place(Path::new("/proc/new")).is_err());
+    }
 
     /// What another program has put there since the name was looked at must not be lost.
     #[test]

@@ -6,12 +6,10 @@ use super::error::ImportError;
 use super::model_tree::{Edges, from_z_up};
 use super::segments::{self, Segment};
 use super::wood_table::{number, separator_of};
+use crate::files::{TableFault, without_byte_order_mark};
 use crate::model::SwayColumns;
 use csv::StringRecord;
 use nalgebra::Point3;
-
-/// What some programs write before the text.
-const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 /// The columns of one of the tools.
 struct Table {
@@ -64,13 +62,14 @@ struct Columns {
 /// # Errors
 /// A column is missing, a row cannot be read, or what it grows from is not in the table.
 pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
-    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    let bytes = bytes.trim_ascii_start();
-    let separator = separator_of(&String::from_utf8_lossy(bytes));
+    // Names in a comment may be in any encoding.
+    let text = String::from_utf8_lossy(bytes);
+    let text = without_byte_order_mark(&text).trim_start();
+    let separator = separator_of(text);
     let mut table = csv::ReaderBuilder::new()
         .delimiter(separator as u8)
         .comment(Some(b'#'))
-        .from_reader(bytes);
+        .from_reader(text.as_bytes());
     let columns = Columns::of(table.headers().map_err(unreadable)?, separator)?;
     let mut rows: Vec<Segment> = Vec::new();
     for row in table.records() {
@@ -91,16 +90,8 @@ pub(super) fn edges(bytes: &[u8]) -> Result<Edges, ImportError> {
 
 /// What is wrong with a row.
 fn unreadable(e: csv::Error) -> ImportError {
-    let line = e.position().map_or(1, csv::Position::line);
-    match e.kind() {
-        csv::ErrorKind::UnequalLengths {
-            expected_len, len, ..
-        } => ImportError::bad_format(format!(
-            "line {line} has {len} cells, and the first line {expected_len}"
-        )),
-        csv::ErrorKind::Utf8 { .. } => ImportError::bad_format("it is no text"),
-        _ => ImportError::bad_format(format!("line {line} cannot be read")),
-    }
+    let TableFault { line, what } = TableFault::from(&e);
+    ImportError::bad_format(format!("line {line}: {what}"))
 }
 
 impl Columns {
@@ -198,7 +189,7 @@ mod tests {
         assert!(
             short
                 .to_string()
-                .contains("line 4 has 3 cells, and the first line 9"),
+                .contains("line 4: it has 3 cells, and the first line 9"),
             "{short}"
         );
         for bad in [

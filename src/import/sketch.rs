@@ -2,6 +2,7 @@
 
 use super::error::ImportError;
 use super::{sketch_json, svg};
+use crate::files::without_byte_order_mark;
 use crate::model::Size;
 use nalgebra::Point2;
 
@@ -66,8 +67,7 @@ pub fn read_strokes(bytes: &[u8]) -> Result<Sketch, ImportError> {
 /// It is neither SVG nor JSON, or cannot be read.
 fn parsed(bytes: &[u8]) -> Result<Sketch, ImportError> {
     let text = std::str::from_utf8(bytes).map_err(|_| ImportError::bad_format("it is no text"))?;
-    // Some editors put a byte order mark before it.
-    let text = text.trim_start_matches('\u{feff}').trim_start();
+    let text = without_byte_order_mark(text).trim_start();
     match text.chars().next() {
         Some('{' | '[') => sketch_json::parse(text),
         Some('<') => svg::parse(text),

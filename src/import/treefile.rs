@@ -7,6 +7,7 @@ use super::model_tree::{Edges, MOST_PLACES, from_z_up};
 use super::segments::{self, Segment};
 use super::sketch::refuse_more;
 use super::wood_table;
+use crate::files::without_byte_order_mark;
 use crate::model::SwayColumns;
 
 /// What a header says on a line: how many numbers there are of the tree and of each segment, and
@@ -28,7 +29,7 @@ struct Columns {
 /// The header names no `x`, `y`, `z` and `parent_id`, a line cannot be read, there are several trees,
 /// or a parent is not in it.
 pub(super) fn edges(text: &str) -> Result<Edges, ImportError> {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = without_byte_order_mark(text);
     let lines = (1..).zip(text.lines());
     let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
     let header = lines.next().map_or("", |(_, line)| line);

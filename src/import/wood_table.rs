@@ -1,5 +1,7 @@
 //! What a file of text says of itself: whether it is a table of wood, and what parts its cells.
 
+use crate::files::without_byte_order_mark;
+
 /// What stands between the cells of a table.
 const SEPARATORS: [char; 3] = [',', ';', '\t'];
 
@@ -28,7 +30,7 @@ impl WoodTable {
 
 /// The first line that is no comment and not empty.
 fn header(text: &str) -> &str {
-    let text = text.trim_start_matches('\u{feff}');
+    let text = without_byte_order_mark(text);
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     lines.find(|line| !line.trim().is_empty()).unwrap_or("")
 }

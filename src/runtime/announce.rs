@@ -202,6 +202,8 @@ fn camera_lost(time_s: f64) -> String {
 pub fn little_motion(tree: &Model, threshold: f64) -> Option<String> {
     let measure = tree.evidence.measure;
     (tree.forced && measure < threshold).then(|| {
+        // Never rounded up to the threshold.
+        let measure = (100.0 * measure).floor() / 100.0;
         format!(
             "the tree was built from little motion (accumulation {measure:.2} of {threshold}); \
              branches may be wrong: film longer, or in more wind"

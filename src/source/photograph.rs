@@ -54,6 +54,9 @@ impl Photograph {
     /// # Errors
     /// It is damaged, of another format, too large or too small.
     pub fn read(bytes: &[u8]) -> Result<Self, PhotographError> {
+        if bytes.is_empty() {
+            return Err(bad_format("the file is empty"));
+        }
         let Some(format) = image_format(bytes) else {
             return Err(bad_format("its first bytes are those of no known format"));
         };
@@ -354,6 +357,7 @@ mod tests {
         let heic = [&[0, 0, 0, 24][..], b"ftypheic", &[0; 12]].concat();
         for (bytes, expected) in [
             (b"no picture".to_vec(), "no picture"),
+            (Vec::new(), "the file is empty"),
             (whole[..whole.len() / 2].to_vec(), "the PNG is cut off"),
             (b"GIF89a\x01\0\x01\0".to_vec(), "it is a GIF"),
             (b"RIFF\x20\0\0\0WEBPVP8 ".to_vec(), "it is a WebP"),

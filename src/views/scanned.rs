@@ -12,6 +12,9 @@ use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+/// Less than this is written as none, degrees.
+const LEAST_LEAN_DEG: f64 = 0.05;
+
 /// A film that was laid on a scan.
 #[derive(Clone, Debug)]
 pub struct FilmOnScan {
@@ -47,11 +50,19 @@ impl FilmOnScan {
             true => "",
             false => "; hang a tag upright beside the trunk (--tag)",
         };
+        let lean_deg = lean.angle.to_degrees();
+        let why = match lean_deg.abs() < LEAST_LEAN_DEG {
+            true => {
+                "how far the tree leans in the film, or the camera was rolled, is not known surer"
+                    .to_owned()
+            }
+            false => format!(
+                "the tree leans in the film, or the camera was rolled, by {lean_deg:.1} degrees"
+            ),
+        };
+        let off = 100.0 * lean.rest_off_hi;
         Some(format!(
-            "the tree leans in the film, or the camera was rolled, by {:.1} degrees; places at rest may be off by \
-             {:.1} % of the height{advice}",
-            lean.angle.to_degrees(),
-            100.0 * lean.rest_off_hi
+            "{why}; places at rest may be off by {off:.1} % of the height{advice}"
         ))
     }
 

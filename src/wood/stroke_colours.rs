@@ -116,17 +116,16 @@ impl StrokeColours {
 /// # Errors
 /// The strokes show too little bark, or OpenCV fails.
 fn bark_of(photo: Photograph, is_stroke: &[bool], is_leaf: &[bool]) -> Result<Colours, NotSeen> {
-    let bark_on = |is_line: &[bool]| Colours::of(photo.picture, |i| is_line[i] && !is_leaf[i]);
     if photo.along == StrokesAlong::Drawn {
         let strokes = photo.strokes.iter();
         let low: Vec<Stroke> = strokes.map(|stroke| lower_part(stroke, LOW)).collect();
         let is_low = drawing::on_lines(&low, photo.picture.size, drawing::STROKE_PX)?;
-        let colours = bark_on(&is_low);
+        let colours = Colours::of(photo.picture, |i| is_low[i] && !is_leaf[i]);
         if colours.count() >= LEAST_BARK {
             return Ok(colours);
         }
     }
-    let colours = bark_on(is_stroke);
+    let colours = Colours::of(photo.picture, |i| is_stroke[i] && !is_leaf[i]);
     match colours.count() < LEAST_BARK {
         true => Err(NotSeen::Wood),
         false => Ok(colours),

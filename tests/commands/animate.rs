@@ -94,6 +94,17 @@ fn apart_px(a: &[Point2<f64>], b: &[Point2<f64>]) -> f64 {
 }
 
 #[test]
+fn a_height_gives_a_moving_tree_metres() {
+    let more = ["--seconds", "1", "--wind", "5", "--height", "7.5"];
+    let (_dir, out) = animated("tree.glb", &more);
+    let model = gltf::Gltf::open(&out).expect("a valid file");
+    let notes = model.as_json().asset.extras.as_ref().expect("notes").get();
+    let notes: serde_json::Value = serde_json::from_str(notes).expect("json");
+    let scale = (&notes["unit"], &notes["scale"]);
+    assert_eq!(scale, (&"m".into(), &"height".into()));
+}
+
+#[test]
 fn the_table_is_as_long_as_asked_and_the_loops_ends_meet() {
     let (_dir, out) = animated(
         "loop.csv",

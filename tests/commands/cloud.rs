@@ -677,7 +677,7 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
         (
             "cut.csv",
             FAILED,
-            "line 2 has 3 cells, and the first line 9",
+            "line 2: it has 3 cells, and the first line 9",
         ),
         ("more.ply", FAILED, "more than its header says"),
         ("tree.mov", BAD_USAGE, "its name does not say"),

@@ -11,7 +11,7 @@ use arborcam::views::{Draft, write_document};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
@@ -647,6 +647,21 @@ const TRIANGLE: &str = r#"{"asset": {"version": "2.0"}, "scenes": [{"nodes": [0]
         "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}],
     "bufferViews": [{"buffer": 0, "byteLength": 36}],
     "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}]}"#;
+
+/// A reader that has seen enough is no fault.
+#[test]
+fn a_reader_of_standard_output_may_leave() {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_arborcam"));
+    let command = command.arg("export").arg(made());
+    let command = command.args(["--format", "ply", "--out", "-"]);
+    let command = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("arborcam");
+    drop(child.stdout.take());
+    let output = child.wait_with_output().expect("its end");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(!told.contains("standard output"), "{told}");
+}
 
 /// All levels of detail, each a model of its own with the same bones; and metres by a height.
 #[test]

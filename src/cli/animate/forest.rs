@@ -57,7 +57,11 @@ fn check(args: &AnimateArgs, kind: Kind) -> Result<(), &'static str> {
                     trees, which are folders of their own",
         );
     }
-    if args.magnify.is_some() || args.pull.is_some() || args.tree.is_given() {
+    if args.magnify.is_some()
+        || args.pull.is_some()
+        || args.tree.is_given()
+        || args.height.is_given()
+    {
         return Err(
             "--magnify, --pull and the options of the tree do not go with a forest; animate one \
                     of its trees, which are folders of their own",

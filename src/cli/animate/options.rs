@@ -2,6 +2,7 @@
 
 use super::super::common::{parse_within, seconds, setting};
 use super::super::render::{ViewName, WHITE, background, rate, size};
+use super::super::scale::HeightArgs;
 use super::super::tree::TreeArgs;
 use crate::bounds::Bounds;
 use crate::config::Config;
@@ -88,6 +89,8 @@ pub struct AnimateArgs {
     /// Draw no leaves in a picture or video.
     #[arg(long)]
     pub bare: bool,
+    #[command(flatten)]
+    pub height: HeightArgs,
     #[command(flatten)]
     pub tree: TreeArgs,
 }

@@ -247,7 +247,7 @@ pub fn background(text: &str) -> Result<[u8; 4], String> {
 
 /// Parses an angle, degrees.
 fn degrees(text: &str) -> Result<f64, String> {
-    parse_within(text, -1e6..=1e6, "give a number")
+    parse_within(text, -1e6..=1e6, "give degrees, -1000000 to 1000000")
 }
 
 /// Parses a frame rate, frames per second.
