@@ -13,6 +13,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+import photos
+
 HERE = Path(__file__).parent
 LIKELY = 127
 
@@ -48,7 +50,8 @@ def shares_of(args, seed):
     true = cv2.imread(str(folder / "wood.png"), 0) > LIKELY
     crowns = [crown(tree, true.shape) for tree in trees]
     often = np.sum(crowns, axis=0)
-    return [share(found(out, k, true.shape), true, crowns[k] & (often == 1)) for k in range(args.trees)]
+    alone = [own & (often == 1) for own in crowns]
+    return [photos.iou(found(out, k, true.shape) & alone[k], true & alone[k]) for k in range(args.trees)]
 
 
 def crown(tree, shape):
@@ -60,10 +63,6 @@ def crown(tree, shape):
 def found(out, k, shape):
     mask = cv2.imread(str(out / f"tree-{k + 1:04}" / "wood.png"), 0)
     return np.zeros(shape, bool) if mask is None else mask > LIKELY
-
-
-def share(found, true, where):
-    return float((found & true & where).sum() / max(((found | true) & where).sum(), 1))
 
 
 if __name__ == "__main__":

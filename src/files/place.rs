@@ -33,7 +33,7 @@ impl Place {
         make: fn(&Path) -> io::Result<()>,
         remove: fn(&Path) -> io::Result<()>,
     ) -> Result<Self, WriteError> {
-        check_place(path)?;
+        refuse_taken(path)?;
         let name = path
             .file_name()
             .ok_or_else(|| no_name(path))?
@@ -123,20 +123,22 @@ impl Drop for Place {
 /// There is something: a file, a folder, or a link, be it one that leads nowhere. Or nothing may be
 /// written in the folder above, or in the first one above that which is there.
 pub fn check_place(path: &Path) -> Result<(), WriteError> {
-    // Not `exists()`: that is false for a link to nowhere.
-    match fs::symlink_metadata(path) {
-        Ok(_) => {
-            return Err(WriteError::Exists {
-                path: path.to_path_buf(),
-            });
-        }
-        Err(e) if e.kind() == io::ErrorKind::NotFound => {}
-        Err(e) => return Err(failed(path, e)),
-    }
+    refuse_taken(path)?;
     let folder = above(path).ancestors().find(|folder| folder.is_dir());
     // Permissions alone do not tell: a file system may be read-only, or no place for files.
     match tempfile::tempfile_in(folder.unwrap_or(Path::new("."))) {
         Ok(_) => Ok(()),
+        Err(e) => Err(failed(path, e)),
+    }
+}
+
+fn refuse_taken(path: &Path) -> Result<(), WriteError> {
+    // Not `exists()`: that is false for a link to nowhere.
+    match fs::symlink_metadata(path) {
+        Ok(_) => Err(WriteError::Exists {
+            path: path.to_path_buf(),
+        }),
+        Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(()),
         Err(e) => Err(failed(path, e)),
     }
 }

@@ -15,6 +15,9 @@ const FARTHEST: f64 = 30_000.0;
 /// Places of lines are given to OpenCV in parts of a pixel, so many bits of them.
 const PIXEL_BITS: i32 = 4;
 
+/// So great a part of a stroke, from below, shows the trunk's bark and width.
+pub(super) const LOW: f64 = 0.5;
+
 /// The line from its beginning on, to this share of its length.
 pub(super) fn lower_part(line: &Stroke, share: f64) -> Stroke {
     let mut left_px = share * length_px(line);

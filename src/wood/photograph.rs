@@ -346,7 +346,7 @@ fn without_thick(mask: &mut [u8], trunk: &Stroke, size: Size) -> opencv::Result<
 /// is not in the picture.
 fn radius_low_px(trunk: &Stroke, inside_px: &[f32], size: Size) -> Option<f32> {
     let mut radii = Vec::new();
-    for ends in drawing::lower_part(trunk, 0.5).windows(2) {
+    for ends in drawing::lower_part(trunk, drawing::LOW).windows(2) {
         let way = ends[1] - ends[0];
         let count = way.norm().ceil().max(1.0) as usize;
         for step in 0..count {

@@ -4,15 +4,13 @@
 use super::Stroke;
 use super::colours::Colours;
 use super::contrast::{self, Along};
-use super::drawing::{self, lower_part};
+use super::drawing::{self, LOW, lower_part};
 use super::mixture::{LogRatio, Mixture};
 use super::photograph::{NotSeen, PARTS, Photograph, StrokesAlong};
 use nalgebra::Vector3;
 
 /// Fewer colours than this on the strokes show no bark.
 const LEAST_BARK: f64 = 64.0;
-/// Bark is looked for in so great a part of a stroke, from below.
-const LOW: f64 = 0.5;
 /// The colours on the strokes are bark if their odds against all else are this at least in their mean, as
 /// a logarithm; elsewhere there is nothing to see.
 const LEAST_TOLD: f64 = 0.5;
