@@ -14,6 +14,7 @@ One row a photograph:
   extent      from the side: how deep the wood is in each quarter of the height (90 % of its length), by the truth
   fullness    from the side: cells of 2.5 % of the height that hold wood in each quarter, by the truth; extent and fullness are
               means of |ratio - 1| over the quarters that hold 10 % of the true wood's length at least
+  far_leaves  share of the true leaves, seen from the front, that are more than 2.5 % of the width from the model's wood
   seconds     wall clock of the whole command; MB its greatest memory
 
 Pixels at 1500 px width: 4 px there are 1.7 px of a film. The last rows are medians. Needs numpy, scipy and
@@ -28,8 +29,8 @@ import numpy as np
 import wood_score
 
 HERE = Path(__file__).parent
-QUARTERS, CELL, REACH, LEAST_SHARE = 4, 0.025, 0.9, 0.1
-COLUMNS = ["foliage", "on_wood", "covered", "radius_err", "silhouette", "extent", "fullness", "nodes", "seconds", "MB"]
+QUARTERS, CELL, REACH, LEAST_SHARE, FAR = 4, 0.025, 0.9, 0.1, 0.025
+COLUMNS = ["foliage", "on_wood", "covered", "radius_err", "silhouette", "extent", "fullness", "far_leaves", "nodes", "seconds", "MB"]
 
 
 def main():
@@ -78,11 +79,13 @@ def row(args, seed, more):
         return {"failed": said.strip()}
     figures = dict(seconds=seconds, MB=peak_mb(args.arborcam, folder, strokes, more, args.work_dir / "peak"))
     film, capture = wood_score.Film(folder), wood_score.Capture(out)
+    mesh = wood_score.Mesh(capture)
     true_wood, true_leaves = (cv2.imread(str(folder / name), 0) for name in ("wood.png", "leaves.png"))
     if look == "leaves":
         figures["foliage"] = iou(cv2.imread(str(out / "leaves.png"), 0) > 127, true_leaves > 127)
+        figures["far_leaves"] = far(true_leaves > 127, mesh.front(film.size))
     figures |= traced(film, capture)
-    figures["silhouette"] = iou(wood_score.Mesh(capture).front(film.size, leaves=True), np.maximum(true_wood, true_leaves) > 127)
+    figures["silhouette"] = iou(mesh.front(film.size, leaves=True), np.maximum(true_wood, true_leaves) > 127)
     figures |= side(film, capture)
     figures["nodes"] = len(capture.rows)
     return figures
@@ -112,6 +115,12 @@ def peak_mb(arborcam, folder, strokes, more, out):
 
 def iou(found, true):
     return float((found & true).sum() / max((found | true).sum(), 1))
+
+
+def far(leaves, wood):
+    """Share of the leaves' pixels that have no wood near them."""
+    away = cv2.distanceTransform((~wood).astype(np.uint8), cv2.DIST_L2, 5)
+    return float((away[leaves] > FAR * leaves.shape[1]).mean())
 
 
 def traced(film, capture):

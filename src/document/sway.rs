@@ -43,12 +43,15 @@ pub(super) fn cells(sway: &Swaying) -> [String; 10] {
 /// The sway that the cells of [`COLUMNS`] tell. A frequency counts with its interval only.
 ///
 /// # Errors
-/// It is not told what made a branch sway whose frequency is known.
+/// A cell holds what is no number, or an interval does not hold its value, or it is not said what made a branch
+/// sway whose frequency is known.
 pub(super) fn read(cells: [&str; 10]) -> Result<Swaying, String> {
     let mut values = [f64::NAN; 6];
-    for (value, cell) in values.iter_mut().zip(cells) {
-        *value = finite(cell).unwrap_or(f64::NAN);
+    for ((value, cell), name) in values.iter_mut().zip(cells).zip(COLUMNS) {
+        *value = number(cell, name)?;
     }
+    refuse_outside(&values[..3], COLUMNS[0], cells[0])?;
+    refuse_outside(&values[3..], COLUMNS[3], cells[3])?;
     let columns = SwayColumns::of_values(values);
     if columns.frequency().is_none() {
         return Ok(Err(
@@ -57,11 +60,27 @@ pub(super) fn read(cells: [&str; 10]) -> Result<Swaying, String> {
     }
     let excitation = Excitation::of_word(cells[7])
         .ok_or_else(|| format!("excitation is {:?}, and must be release or wind", cells[7]))?;
-    let amplitude_deg = finite(cells[8]).unwrap_or(f64::NAN);
+    let amplitude_deg = number(cells[8], COLUMNS[8])?;
     let sway = columns.sway(excitation, amplitude_deg);
     Ok(sway.ok_or(Unidentified::NotMeasured))
 }
 
-fn finite(cell: &str) -> Option<f64> {
-    cell.parse().ok().filter(|x: &f64| x.is_finite())
+/// # Errors
+/// The value, which stands before both ends of its interval, lies outside of it.
+fn refuse_outside(value_and_ends: &[f64], name: &str, cell: &str) -> Result<(), String> {
+    match value_and_ends {
+        [value, lo, hi] if value < lo || value > hi => Err(format!(
+            "{name} is {cell:?}, and must lie between {lo} and {hi}"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The number of a cell; NaN of an empty one.
+fn number(cell: &str, name: &str) -> Result<f64, String> {
+    if cell.is_empty() {
+        return Ok(f64::NAN);
+    }
+    let number = cell.parse().ok().filter(|x: &f64| x.is_finite());
+    number.ok_or_else(|| format!("{name} is {cell:?}, and must be a number"))
 }

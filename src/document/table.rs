@@ -7,7 +7,7 @@ use super::error::DocumentError;
 use super::number;
 use crate::files::{TableFault, WriteError};
 use crate::model::{FARTHEST_PX, NodeName};
-use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};
+use csv::{ErrorKind, Position, Reader, StringRecord};
 use nalgebra::Point3;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -164,8 +164,7 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// # Errors
     /// It cannot be read, or lacks a column.
     pub fn new(file: PathBuf, from: R, columns: [&str; N]) -> Result<Self, DocumentError> {
-        // Rows of another length are told by us, with their line.
-        let mut reader = ReaderBuilder::new().flexible(true).from_reader(from);
+        let mut reader = Reader::from_reader(from);
         let header = reader.headers().map_err(|e| explain(&file, e))?.clone();
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(columns) {
@@ -186,26 +185,15 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// Takes the next row; `false` at the end.
     ///
     /// # Errors
-    /// The file cannot be read, or is no text there.
+    /// The file cannot be read, or is no text there, or the row has not as many cells as the first line, as where the
+    /// file was cut off.
     pub fn next(&mut self) -> Result<bool, DocumentError> {
         self.reader
             .read_record(&mut self.row)
             .map_err(|e| explain(&self.file, e))
     }
 
-    /// # Errors
-    /// The row has fewer cells than the first line: the file was cut off.
-    pub fn refuse_short(&self) -> Result<(), DocumentError> {
-        let (cells, columns) = (self.row.len(), self.header.len());
-        match cells < columns {
-            true => Err(self.bad(format!(
-                "it has {cells} cells, and the first line {columns}"
-            ))),
-            false => Ok(()),
-        }
-    }
-
-    /// The cell of the `i`-th column that was asked for; empty where the row is too short.
+    /// The cell of the `i`-th column that was asked for.
     pub fn cell(&self, i: usize) -> &str {
         self.row.get(self.columns[i]).unwrap_or("")
     }
@@ -249,6 +237,17 @@ impl<R: Read, const N: usize> TableReader<R, N> {
                 self.cell(i)
             ))
         })
+    }
+
+    /// A number, or none in an empty cell.
+    ///
+    /// # Errors
+    /// The cell holds something else.
+    pub fn number_or_none(&self, i: usize, name: &str) -> Result<Option<f64>, DocumentError> {
+        match self.cell(i).is_empty() {
+            true => Ok(None),
+            false => self.number(i, name).map(Some),
+        }
     }
 
     /// A length of the model in pixels, `px` of them to the file's unit.

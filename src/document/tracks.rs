@@ -369,9 +369,9 @@ impl<'a> TracksReader<'a> {
         if !table.next()? {
             return Ok(None);
         }
-        table.refuse_short()?;
         // A point that is nowhere has no place, as it was not seen.
-        let [u_px, v_px] = [table.cell(3), table.cell(4)].map(|c| c.parse().unwrap_or(f32::NAN));
+        let u_px = table.number_or_none(3, "u_px")?.unwrap_or(f64::NAN) as f32;
+        let v_px = table.number_or_none(4, "v_px")?.unwrap_or(f64::NAN) as f32;
         let mut row = TrackRow {
             time_s: table.number(2, "time_s")?,
             observation: at_px(TrackId(table.whole(0, "track_id")?), u_px, v_px),

@@ -89,6 +89,16 @@ impl Attractors {
         pairs.map(|(d, lower)| f64::from(d - lower.sqrt())).sum()
     }
 
+    /// The attractors that are farther from the tree than `least_px`, the farthest first.
+    pub fn beyond(&self, least_px: f64) -> Vec<Point2<f64>> {
+        let pairs = self.places.iter().zip(&self.nearest_px);
+        let mut far: Vec<_> = pairs.filter(|(_, d)| f64::from(**d) > least_px).collect();
+        far.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+        far.into_iter()
+            .map(|(place, _)| place.cast().xy())
+            .collect()
+    }
+
     /// How far the attractors are from the tree, px in their mean.
     pub fn mean_px(&self) -> f64 {
         let sum: f64 = self.nearest_px.iter().map(|d| f64::from(*d)).sum();

@@ -5,10 +5,14 @@
 //! turns, and keeps the one that brings the attractors nearest: in the picture and in space in turns.
 //! What would leave the tree in the picture, or its room in space, or come too near to a branch is
 //! pruned before it counts.
+//!
+//! Subtrees are as long as what carries them, so that where no branch is seen they come nowhere near the leaves, as
+//! in the upper half of a dense crown. In the end limbs lead there, each from the branch that is nearest and runs
+//! that way.
 
 use super::attractors::Attractors;
 use super::library::{Library, Subtree, frame};
-use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
+use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, RADIUS_SHARE, Skeleton};
 use crate::random::Generator;
 use nalgebra::{Point2, Point3, Rotation3, Unit, Vector3};
 use rand::RngExt;
@@ -23,6 +27,14 @@ const TURNS: u32 = 12;
 const IDLE_ROUNDS: usize = 12;
 /// Least gain of a round for each new branch, by the distance between attractors in the picture.
 const LEAST_GAIN: f64 = 2.0;
+/// An attractor this many times as far from the tree as attractors are from one another gets a limb of its own.
+const FAR_STEPS: f64 = 1.5;
+/// Places along a branch from which such a limb may leave, and how many of the nearest are tried.
+const LIMB_SHARES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+const LIMB_ORIGINS: usize = 24;
+/// Depths that are tried for its end, and how steep it is out of the picture at most, degrees.
+const LIMB_DEPTHS: usize = 6;
+const STEEPEST_DEG: f64 = 45.0;
 /// Nothing grows on a branch shorter than this share of the tree's height.
 const SHORTEST: f64 = 0.02;
 /// A new branch ends at least this share of its length away from all other branches.
@@ -60,7 +72,7 @@ pub struct Growth {
 }
 
 /// Grows branches on those of `tree`, which has no copies. They are of the kind `grown`, and stand
-/// after all others.
+/// after all others. There are `rounds` of subtrees and as many limbs at most.
 pub fn grow_subtrees(
     tree: &mut Skeleton,
     library: &Library,
@@ -76,6 +88,11 @@ pub fn grow_subtrees(
         let has_grown = engine.round(in_space, random);
         idle = if has_grown { 0 } else { idle + 1 };
         done += 1;
+    }
+    for _ in 0..rounds {
+        if !engine.lead_limb(random) {
+            break;
+        }
     }
     let growth = Growth {
         branches: engine.branches.iter().filter(|b| b.is_grown).count(),
@@ -125,6 +142,17 @@ struct Candidate {
     branch: usize,
     shoots: Vec<Shoot>,
     gain: f64,
+}
+
+/// A place on a branch from which a limb may leave.
+#[derive(Clone, Copy, Debug)]
+struct LimbOrigin {
+    branch: usize,
+    /// How far along the branch, 0 to 1.
+    share: f64,
+    at: Point3<f64>,
+    /// How far it is, px, up to three times as much where the limb would lead back.
+    cost: f64,
 }
 
 struct Engine<'a> {
@@ -257,6 +285,73 @@ impl<'a> Engine<'a> {
             }
             _ => false,
         }
+    }
+
+    /// Leads a limb to the attractor in the picture that is farthest from the tree and can be reached; `false` where
+    /// there is none.
+    fn lead_limb(&mut self, random: &mut Generator) -> bool {
+        let targets = self.in_picture.beyond(FAR_STEPS * self.in_picture.step_px);
+        let limb = targets.iter().find_map(|at| self.limb_to(*at, random));
+        if let Some(limb) = &limb {
+            self.add(limb);
+        }
+        limb.is_some()
+    }
+
+    /// A limb to a place in the picture (model axes, px), from a branch that is near and leads there.
+    fn limb_to(&self, target: Point2<f64>, random: &mut Generator) -> Option<Candidate> {
+        let mut origins = self.limb_origins(target);
+        origins.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        for origin in origins.into_iter().take(LIMB_ORIGINS) {
+            let reach = (target - origin.at.xy()).norm();
+            for _ in 0..LIMB_DEPTHS {
+                let steep = random.random_range(-STEEPEST_DEG..STEEPEST_DEG);
+                let depth = origin.at.z + reach * steep.to_radians().tan();
+                let to = Point3::new(target.x, target.y, depth);
+                let length = (to - origin.at).norm() / self.vector(origin.branch).norm();
+                let shoot = Shoot {
+                    on: None,
+                    at: origin.share,
+                    from: origin.at,
+                    to,
+                    radius_share: RADIUS_SHARE * length.min(1.0).sqrt(),
+                };
+                if self.is_free(&shoot, &[]) {
+                    return Some(Candidate {
+                        branch: origin.branch,
+                        shoots: vec![shoot],
+                        gain: 0.0,
+                    });
+                }
+            }
+        }
+        None
+    }
+
+    /// Where a limb to a place in the picture may leave the tree.
+    fn limb_origins(&self, target: Point2<f64>) -> Vec<LimbOrigin> {
+        let mut origins = Vec::new();
+        for (branch, own) in self.branches.iter().enumerate() {
+            if own.generation >= MOST_GENERATIONS {
+                continue;
+            }
+            let along = self.vector(branch).xy();
+            for share in LIMB_SHARES {
+                let Some(at) = self.along(branch, share) else {
+                    continue;
+                };
+                let way = target - at.xy();
+                let cosine = way.dot(&along) / (way.norm() * along.norm()).max(1e-9);
+                let cost = way.norm() * (2.0 - cosine);
+                origins.push(LimbOrigin {
+                    branch,
+                    share,
+                    at,
+                    cost,
+                });
+            }
+        }
+        origins
     }
 
     /// Branches that are tried, drawn with a probability of one by its generation (Efraimidis and Spirakis
@@ -614,6 +709,32 @@ mod tests {
     fn attractors_in_space_make_the_tree_as_full_from_the_side() {
         let [flat, full] = [false, true].map(|in_space| depth(&grown(in_space, 40).0));
         assert!(full > 1.3 * flat, "{full} {flat}");
+    }
+
+    /// Nothing was seen of the right half: leaves there hung in the air.
+    #[test]
+    fn limbs_lead_to_where_no_branch_is_near() {
+        let crown = crown();
+        let region = GrowthRegion {
+            tree: &crown,
+            room: &|_: &Point3<f64>, _: &Point3<f64>| true,
+            in_space: true,
+            tip_px: 0.3,
+        };
+        let mut seen = Skeleton::forked();
+        seen.nodes.truncate(3);
+        let library = Library::predefined(SubtreeKind::Both);
+        let farthest = |rounds: usize| {
+            let mut tree = seen.clone();
+            let random = &mut generator(5, 0);
+            grow_subtrees(&mut tree, &library, &region, rounds, random);
+            let engine = Engine::new(&tree, &library, &region);
+            let away = |steps: f64| engine.in_picture.beyond(steps * engine.in_picture.step_px);
+            (away(2.0).len(), away(0.0).len())
+        };
+        let (before, all) = farthest(0);
+        assert!(3 * before > all, "{before} of {all}");
+        assert_eq!(farthest(ROUNDS).0, 0);
     }
 
     #[test]

@@ -69,9 +69,7 @@ pub(super) fn taper(nodes: &mut [Node], seen_px: &[Option<f64>]) {
     }
     for i in (1..nodes.len()).rev() {
         let own = nodes[i].radius;
-        if let (Some(parent), Some(_)) = (nodes[i].parent, seen(i))
-            && seen(parent.index()).is_none()
-        {
+        if let Some(parent) = nodes[i].parent.filter(|p| seen(p.index()).is_none()) {
             nodes[parent.index()].radius = nodes[parent.index()].radius.max(own);
         }
     }
@@ -283,6 +281,24 @@ mod tests {
         }
         assert_eq!(nodes[4].radius, 4.0);
         assert_eq!(nodes[5].radius, 4.0);
+    }
+
+    /// Two that are hidden, one after the other, made all beyond them as thin as a twig.
+    #[test]
+    fn what_is_hidden_along_a_limb_does_not_make_its_end_thin() {
+        let mut nodes = tree();
+        let seen = [
+            None,
+            Some(9.0),
+            None,
+            None,
+            Some(7.0),
+            Some(6.0),
+            None,
+            None,
+        ];
+        taper(&mut nodes, &seen);
+        assert_eq!(radii(&nodes)[1..6], [9.0, 7.0, 7.0, 7.0, 6.0]);
     }
 
     /// Two branches side by side that are seen as one do not make a thick one.

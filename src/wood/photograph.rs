@@ -449,13 +449,21 @@ struct Carries {
     kept: usize,
 }
 
-/// Sets the radius of pieces that leaves hide to 0: a stroke through leaves is a branch, and is no
-/// measure of its width.
+/// Sets the radius of pieces that leaves hide to 0, and of those that go on behind leaves alone: a stroke through
+/// leaves is a branch, and is no measure of its width, and where leaves begin the width is what they leave of it.
 fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
-    let ends: Vec<Point2<f64>> = branches.nodes.iter().map(|n| n.position_px).collect();
-    for (node, to) in branches.nodes.iter_mut().zip(&ends) {
-        let from = node.parent.map(|p| ends[p]);
-        if from.is_some_and(|from| hidden_share(from, *to, leaves, size) > HIDDEN) {
+    let nodes = &mut branches.nodes;
+    let mut is_hidden = vec![false; nodes.len()];
+    let mut above: Vec<Carries> = vec![Carries::default(); nodes.len()];
+    for (i, node) in nodes.iter().enumerate() {
+        let Some(parent) = node.parent else { continue };
+        let share = hidden_share(nodes[parent].position_px, node.position_px, leaves, size);
+        is_hidden[i] = share > HIDDEN;
+        above[parent].all += 1;
+        above[parent].kept += usize::from(!is_hidden[i]);
+    }
+    for ((node, is_hidden), above) in nodes.iter_mut().zip(is_hidden).zip(above) {
+        if is_hidden || (above.all > 0 && above.kept == 0) {
             node.radius_px = 0.0;
         }
     }

@@ -284,6 +284,16 @@ fn damage_is_named_with_file_and_line() {
             "nodes.csv, line 5: radius is -1",
         ),
         (
+            "nodes.csv",
+            |t| with(t, 5, 10, "fast"),
+            "nodes.csv, line 5: frequency_hz is \"fast\"",
+        ),
+        (
+            "nodes.csv",
+            |t| with(with(with(t, 5, 10, "3"), 5, 11, "1"), 5, 12, "2"),
+            "line 5: frequency_hz is \"3\", and must lie between 1 and 2",
+        ),
+        (
             "motion.csv",
             |t| with(t, 90, 4, "-1e7"),
             "motion.csv, line 90: y is \"-1e7\"",

@@ -30,6 +30,20 @@ const PCD: &str = "# .PCD v.7\nVERSION .7\nFIELDS x y z i\nSIZE 4 4 4 4\nTYPE F 
                    HEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 3\n";
 const TEXT: &str = "1 2 3 9\n1 nan 3 9\n4 5.5 6 9\n";
 
+/// A number of each point in front was taken for x, and decimals after a comma for y.
+#[test]
+fn text_has_its_places_in_named_columns_and_no_decimal_commas() {
+    let rows = TEXT.replace('\n', "\n7 ");
+    for names in ["id x y z i", "#id, \"X\", \"Y\", \"Z\", i", "//id;x;y;z;i"] {
+        let text = format!("{names}\n7 {}", rows.trim_end_matches("7 "));
+        expected(&read_bytes(text.as_bytes(), CloudFormat::Text).expect(names));
+    }
+    expected(&read_bytes(TEXT.replace(' ', ", ").as_bytes(), CloudFormat::Text).expect("parted"));
+    let commas = read_bytes(b"1,25 2,5 3,75\n", CloudFormat::Text).expect_err("decimal commas");
+    let what = commas.to_string();
+    assert!(what.contains("line 1 has white space and commas"), "{what}");
+}
+
 #[test]
 fn ply_is_read_as_text_and_as_bytes_and_to_its_end() {
     let text = format!("ply\nformat ascii 1.0\n{PLY}{TEXT}");
