@@ -7,7 +7,7 @@ use super::error::DocumentError;
 use super::number;
 use crate::files::{TableFault, WriteError};
 use crate::model::{FARTHEST_PX, NodeName};
-use csv::{ErrorKind, Position, Reader, StringRecord};
+use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};
 use nalgebra::Point3;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -164,7 +164,8 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// # Errors
     /// It cannot be read, or lacks a column.
     pub fn new(file: PathBuf, from: R, columns: [&str; N]) -> Result<Self, DocumentError> {
-        let mut reader = Reader::from_reader(from);
+        // Rows that lack what is asked for are refused by us; others may be short.
+        let mut reader = ReaderBuilder::new().flexible(true).from_reader(from);
         let header = reader.headers().map_err(|e| explain(&file, e))?.clone();
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(columns) {
@@ -185,12 +186,16 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// Takes the next row; `false` at the end.
     ///
     /// # Errors
-    /// The file cannot be read, or is no text there, or the row has not as many cells as the first line, as where the
-    /// file was cut off.
+    /// The file cannot be read, or is no text there, or the row lacks a column that was asked for, as where the file was
+    /// cut off.
     pub fn next(&mut self) -> Result<bool, DocumentError> {
-        self.reader
-            .read_record(&mut self.row)
-            .map_err(|e| explain(&self.file, e))
+        let read = self.reader.read_record(&mut self.row);
+        let is_there = read.map_err(|e| explain(&self.file, e))?;
+        let (cells, columns) = (self.row.len(), self.header.len());
+        match is_there && self.columns.iter().any(|column| *column >= cells) {
+            true => Err(self.bad(TableFault::of_length(cells, columns))),
+            false => Ok(is_there),
+        }
     }
 
     /// The cell of the `i`-th column that was asked for.
@@ -231,23 +236,23 @@ impl<R: Read, const N: usize> TableReader<R, N> {
             .parse()
             .ok()
             .filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
-        number.ok_or_else(|| {
-            self.bad(format!(
-                "{name} is {:?}, and must be a number",
-                self.cell(i)
-            ))
-        })
+        number.ok_or_else(|| self.no_number(i, name))
     }
 
-    /// A number, or none in an empty cell.
+    /// A number, which may be infinite or none; none in an empty cell.
     ///
     /// # Errors
-    /// The cell holds something else.
-    pub fn number_or_none(&self, i: usize, name: &str) -> Result<Option<f64>, DocumentError> {
-        match self.cell(i).is_empty() {
-            true => Ok(None),
-            false => self.number(i, name).map(Some),
+    /// The cell holds words.
+    pub fn any_number(&self, i: usize, name: &str) -> Result<f64, DocumentError> {
+        match self.cell(i) {
+            "" => Ok(f64::NAN),
+            cell => cell.parse().map_err(|_| self.no_number(i, name)),
         }
+    }
+
+    fn no_number(&self, i: usize, name: &str) -> DocumentError {
+        let cell = self.cell(i);
+        self.bad(format!("{name} is {cell:?}, and must be a number"))
     }
 
     /// A length of the model in pixels, `px` of them to the file's unit.

@@ -370,8 +370,8 @@ impl<'a> TracksReader<'a> {
             return Ok(None);
         }
         // A point that is nowhere has no place, as it was not seen.
-        let u_px = table.number_or_none(3, "u_px")?.unwrap_or(f64::NAN) as f32;
-        let v_px = table.number_or_none(4, "v_px")?.unwrap_or(f64::NAN) as f32;
+        let u_px = table.any_number(3, "u_px")? as f32;
+        let v_px = table.any_number(4, "v_px")? as f32;
         let mut row = TrackRow {
             time_s: table.number(2, "time_s")?,
             observation: at_px(TrackId(table.whole(0, "track_id")?), u_px, v_px),

@@ -112,34 +112,8 @@ impl Qsm {
             pieces,
             decimals: 4 + more,
         };
-        qsm.thin_within_carriers();
         qsm.complete();
         qsm
-    }
-
-    /// A branch begins within what carries it, and is no thicker there than where it comes out.
-    fn thin_within_carriers(&mut self) {
-        let pieces = &mut self.pieces;
-        // The first cylinder of the branch of each that lies within the carrier.
-        let mut begin: Vec<Option<usize>> = Vec::with_capacity(pieces.len());
-        for (i, own) in pieces.iter().enumerate() {
-            let first = match own.parent {
-                Some(p) if pieces[p].branch != own.branch => Some(i),
-                Some(p) => begin[p],
-                None => None,
-            };
-            begin.push(first.filter(|first| {
-                let carrier = pieces[*first].parent.map_or(0.0, |p| pieces[p].radius);
-                (own.start - pieces[*first].start).norm() < carrier
-            }));
-        }
-        for i in (0..pieces.len()).rev() {
-            let own = &pieces[i];
-            let goes_on = own.parent.filter(|p| pieces[*p].branch == own.branch);
-            if let Some(p) = goes_on.filter(|p| begin[*p].is_some()) {
-                pieces[p].radius = pieces[p].radius.min(pieces[i].radius);
-            }
-        }
     }
 
     /// Finds what follows from parents and branches.
@@ -392,6 +366,20 @@ mod tests {
             0.01,
             Point3::new(5.0, 6.0, 7.0),
         )
+    }
+
+    /// A stem beside the trunk was of order 0 in this table and of 1 in nodes.csv.
+    #[test]
+    fn orders_are_those_of_the_nodes_also_at_the_foot() {
+        let mut skeleton = Skeleton::forked();
+        skeleton.nodes[3].parent = Some(NodeId(0));
+        let branches = skeleton.botanical_branches();
+        let of_nodes = [1, 2, 3].map(|n| branches.order(NodeId(n)));
+        assert_eq!(of_nodes, [0, 0, 1]);
+        let qsm = of_tree(skeleton, &[]);
+        let mut orders: Vec<u32> = qsm.pieces.iter().map(|p| p.order).collect();
+        orders.dedup();
+        assert_eq!(orders, [0, 1]);
     }
 
     #[test]

@@ -18,14 +18,14 @@ pub struct Cylinder {
     pub radius: f64,
     /// Number of the branch, from 0: limbs that go on in one another are one.
     pub branch: usize,
-    /// 0 for the trunk, one more for every branch that leaves.
+    /// 0 for the trunk, one more for every branch that leaves: of branches that begin at the foot, 1.
     pub order: u32,
     /// The limb that it is a piece of.
     pub limb: usize,
 }
 
-/// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the
-/// cylinder. Pieces without length are left out. Branches and orders are those of
+/// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the cylinder, and within what
+/// carries it as where it comes out of that. Pieces without length are left out. Branches and orders are those of
 /// [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends where it begins, or
 /// leaves it.
 pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
@@ -41,11 +41,45 @@ pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder>
             goes_on[p] = Some(i);
         }
     }
-    pieces(limbs, &goes_on)
+    let order_of = |limb: &Limb| branches.order(limb.node);
+    let mut cylinders = pieces(limbs, &goes_on, order_of);
+    thin_within_carriers(&mut cylinders);
+    cylinders
 }
 
-/// The cylinders of limbs; `goes_on` holds the limb in which each goes on.
-fn pieces(limbs: &[Limb], goes_on: &[Option<usize>]) -> Vec<Cylinder> {
+/// A branch begins within what carries it, and is no thicker there than where it comes out.
+fn thin_within_carriers(cylinders: &mut [Cylinder]) {
+    // The first cylinder of the branch of each that lies within the carrier.
+    let mut begin: Vec<Option<usize>> = Vec::with_capacity(cylinders.len());
+    for (i, own) in cylinders.iter().enumerate() {
+        let first = match own.parent {
+            Some(p) if cylinders[p].branch != own.branch => Some(i),
+            Some(p) => begin[p],
+            None => None,
+        };
+        begin.push(first.filter(|first| {
+            let carrier = cylinders[*first]
+                .parent
+                .map_or(0.0, |p| cylinders[p].radius);
+            (own.start - cylinders[*first].start).norm() < carrier
+        }));
+    }
+    for i in (0..cylinders.len()).rev() {
+        let own = &cylinders[i];
+        let goes_on = own.parent.filter(|p| cylinders[*p].branch == own.branch);
+        if let Some(p) = goes_on.filter(|p| begin[*p].is_some()) {
+            cylinders[p].radius = cylinders[p].radius.min(cylinders[i].radius);
+        }
+    }
+}
+
+/// The cylinders of limbs; `goes_on` holds the limb in which each goes on, and `order_of` says the order of one
+/// that is no twig.
+fn pieces(
+    limbs: &[Limb],
+    goes_on: &[Option<usize>],
+    order_of: impl Fn(&Limb) -> u32,
+) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch with its order.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
@@ -57,7 +91,11 @@ fn pieces(limbs: &[Limb], goes_on: &[Option<usize>]) -> Vec<Cylinder> {
             Some(p) if goes_on[p] == Some(i) => branch_of[p],
             _ => {
                 branches += 1;
-                (branches - 1, parent.map_or(0, |p| branch_of[p].1 + 1))
+                let order = match parent.filter(|_| limb.twig) {
+                    Some(p) => branch_of[p].1 + 1,
+                    None => order_of(limb),
+                };
+                (branches - 1, order)
             }
         };
         branch_of.push((branch, order));

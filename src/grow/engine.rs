@@ -39,8 +39,8 @@ const STEEPEST_DEG: f64 = 45.0;
 const SHORTEST: f64 = 0.02;
 /// A new branch ends at least this share of its length away from all other branches.
 const CLEAR: f64 = 0.2;
-/// Places along a branch at which its distance from attractors is looked at, and whether it is
-/// inside.
+/// Places along a branch at which its distance from attractors is looked at, at least, and whether it is
+/// inside. Along a long one they are as far apart as attractors.
 const SAMPLES: u32 = 3;
 const LOOKED_AT: u32 = 5;
 /// A place nearer than this share of its branch's length to a joint is that joint.
@@ -206,10 +206,11 @@ impl<'a> Engine<'a> {
                 own: Some(node.clone()),
             });
         }
+        let step_px = engine.in_picture.step_px;
         let mut samples = Vec::new();
         for joint in &engine.joints {
             if let Some(parent) = joint.parent {
-                sample(engine.joints[parent].at, joint.at, &mut samples);
+                sample(engine.joints[parent].at, joint.at, step_px, &mut samples);
             }
         }
         engine.take(samples);
@@ -262,7 +263,7 @@ impl<'a> Engine<'a> {
                     if shoots.is_empty() {
                         continue;
                     }
-                    let samples = samples_of(&shoots);
+                    let samples = samples_of(&shoots, self.in_picture.step_px);
                     let gain = match in_space {
                         true => self.in_space.gain(&samples),
                         false => self.in_picture.gain(&samples),
@@ -526,7 +527,7 @@ impl<'a> Engine<'a> {
             });
             branch_of.push(branch);
         }
-        self.take(samples_of(&grown.shoots));
+        self.take(samples_of(&grown.shoots, self.in_picture.step_px));
         for shoot in &grown.shoots {
             self.attract_quarter_turned(shoot.to);
         }
@@ -613,15 +614,18 @@ struct PlaceAlong {
     same: f64,
 }
 
-fn sample(from: Point3<f64>, to: Point3<f64>, into: &mut Vec<Point3<f64>>) {
-    let shares = (1..=SAMPLES).map(|k| f64::from(k) / f64::from(SAMPLES));
+/// Places from one to another, `step_px` apart at most.
+fn sample(from: Point3<f64>, to: Point3<f64>, step_px: f64, into: &mut Vec<Point3<f64>>) {
+    let count = ((to - from).norm() / step_px).ceil().min(1e4) as u32;
+    let count = count.max(SAMPLES);
+    let shares = (1..=count).map(|k| f64::from(k) / f64::from(count));
     into.extend(shares.map(|share| from + share * (to - from)));
 }
 
-fn samples_of(shoots: &[Shoot]) -> Vec<Point3<f64>> {
+fn samples_of(shoots: &[Shoot], step_px: f64) -> Vec<Point3<f64>> {
     let mut samples = Vec::with_capacity(SAMPLES as usize * shoots.len());
     for shoot in shoots {
-        sample(shoot.from, shoot.to, &mut samples);
+        sample(shoot.from, shoot.to, step_px, &mut samples);
     }
     samples
 }
