@@ -120,7 +120,7 @@ def iou(found, true):
 def far(leaves, wood):
     """Share of the leaves' pixels that have no wood near them."""
     away = cv2.distanceTransform((~wood).astype(np.uint8), cv2.DIST_L2, 5)
-    return float((away[leaves] > FAR * leaves.shape[1]).mean())
+    return float((away[leaves] > FAR * leaves.shape[1]).sum() / max(leaves.sum(), 1))
 
 
 def traced(film, capture):

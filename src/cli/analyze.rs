@@ -20,6 +20,8 @@ use crate::views::{SwayFound, update};
 use anyhow::anyhow;
 use nalgebra::Point2;
 pub use options::AnalyzeArgs;
+use options::LensProfile;
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -193,6 +195,9 @@ fn analyse_capture(
         notes.add("note", unsure);
     }
     let camera = Optics::of(args, document)?;
+    if let Some(undone) = camera.note(args) {
+        notes.add("note", undone);
+    }
     let filmed = film(args, document, marked.as_ref(), &config, &mut notes)?;
     let take = Take::of(camera.film(&filmed));
     if let Some(warning) = take.warning() {
@@ -286,7 +291,7 @@ impl Optics {
         let size = document.skeleton.image_size;
         let lens = match &args.lens {
             None => None,
-            Some(lens) => Some(lens.for_size(size).ok_or_else(|| {
+            Some(LensProfile { lens, .. }) => Some(lens.for_size(size).ok_or_else(|| {
                 let profile = lens.size;
                 CommandError::BadUsage(anyhow!(
                     "--lens is for pictures of the proportions {profile}, this film is {size}; give \
@@ -300,6 +305,21 @@ impl Optics {
             readout_s: args.readout_ms.map_or(profile_s, |ms| ms / 1000.0),
             height_px: f64::from(size.height),
         })
+    }
+
+    /// What is said of it; `None` where nothing is undone.
+    fn note(&self, args: &AnalyzeArgs) -> Option<String> {
+        let mut undone = Vec::new();
+        if let Some(LensProfile { file, .. }) = &args.lens {
+            undone.push(format!("points are put where no lens distorts ({file})"));
+        }
+        if self.readout_s > 0.0 {
+            let readout_ms = 1000.0 * self.readout_s;
+            undone.push(format!(
+                "rows count as read one after the other within {readout_ms:.1} ms"
+            ));
+        }
+        (!undone.is_empty()).then(|| undone.join("; "))
     }
 
     fn film(&self, film: &Film) -> Film {
@@ -357,13 +377,33 @@ fn unsure_parents(marked: &MarkedTree) -> Option<String> {
     ))
 }
 
-/// Calls the branches as the markers are called in which they end.
+/// Calls the branches as the markers are called in which they end, and so in the modes; a limb of several as the first
+/// of them.
 fn name_by_markers(study: &mut Study, marked: &MarkedTree) {
     study.by_markers = true;
+    let mut marker_of: BTreeMap<String, &String> = BTreeMap::new();
     for branch in &mut study.branches {
         if let Some(name) = marked.names.get(&NodeName(branch.name)) {
-            branch.piece.clone_from(name);
+            let piece = std::mem::replace(&mut branch.piece, name.clone());
+            marker_of.insert(piece, name);
         }
+    }
+    let rename = |limb: &mut String| {
+        if let Some(name) = marker_of.get(limb.as_str()) {
+            limb.clone_from(name);
+        }
+    };
+    for mode in &mut study.modes {
+        mode.branch = mode.node.and_then(|node| marked.names.get(&node).cloned());
+        mode.energy
+            .iter_mut()
+            .for_each(|part| rename(&mut part.limb));
+    }
+    for branch in &mut study.branches {
+        let moves_with = branch.participation.iter_mut();
+        moves_with
+            .filter_map(|p| p.branch.as_mut())
+            .for_each(rename);
     }
 }
 

@@ -378,11 +378,15 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
                 .to_owned(),
         );
     }
-    if tree.seen.may_have_red_leaves {
-        warnings.push(
-            "half of the crown is red, and leaves were looked for as green: if these are leaves, give --foliage red"
-                .to_owned(),
-        );
+    if let Some(colour) = tree.seen.other_leaves {
+        let colour = colour.name();
+        let sought = match tree.is_said_bare {
+            true => "not looked for",
+            false => "looked for as green",
+        };
+        warnings.push(format!(
+            "half of the crown is {colour}, and leaves were {sought}: if these are leaves, give --foliage {colour}"
+        ));
     }
     if tree.seen.is_as_around {
         warnings.push(

@@ -32,7 +32,24 @@ pub(super) fn as_read<T: FromStr + From<f32>>(x: f64, decimals: usize) -> T {
     written.parse().unwrap_or_else(|_| f32::NAN.into())
 }
 
-/// The same as a text of its own.
+/// The number of a cell; `None` where it is unknown: in an empty cell, and where it is infinite or none.
+///
+/// # Errors
+/// The cell holds words.
+pub(super) fn known(cell: &str, name: &str) -> Result<Option<f64>, String> {
+    if cell.is_empty() {
+        return Ok(None);
+    }
+    let number: f64 = cell.parse().map_err(|_| is_none(cell, name))?;
+    Ok(number.is_finite().then_some(number))
+}
+
+/// What is wrong with a cell that should hold a number.
+pub(super) fn is_none(cell: &str, name: &str) -> String {
+    format!("{name} is {cell:?}, and must be a number")
+}
+
+/// What [`push`] appends, as a text of its own.
 pub(super) fn text(x: f64, decimals: usize) -> String {
     let mut text = String::new();
     push(&mut text, x, decimals);

@@ -48,10 +48,11 @@ pub(super) fn cells(sway: &Swaying) -> [String; 10] {
 pub(super) fn read(cells: [&str; 10]) -> Result<Swaying, String> {
     let mut values = [f64::NAN; 6];
     for ((value, cell), name) in values.iter_mut().zip(cells).zip(COLUMNS) {
-        *value = number(cell, name)?;
+        *value = number::known(cell, name)?.unwrap_or(f64::NAN);
     }
-    refuse_outside(&values[..3], COLUMNS[0], cells[0])?;
-    refuse_outside(&values[3..], COLUMNS[3], cells[3])?;
+    let [f, f_lo, f_hi, d, d_lo, d_hi] = values;
+    refuse_outside([f, f_lo, f_hi], COLUMNS[0], cells[0])?;
+    refuse_outside([d, d_lo, d_hi], COLUMNS[3], cells[3])?;
     let columns = SwayColumns::of_values(values);
     if columns.frequency().is_none() {
         return Ok(Err(
@@ -60,27 +61,18 @@ pub(super) fn read(cells: [&str; 10]) -> Result<Swaying, String> {
     }
     let excitation = Excitation::of_word(cells[7])
         .ok_or_else(|| format!("excitation is {:?}, and must be release or wind", cells[7]))?;
-    let amplitude_deg = number(cells[8], COLUMNS[8])?;
+    let amplitude_deg = number::known(cells[8], COLUMNS[8])?.unwrap_or(f64::NAN);
     let sway = columns.sway(excitation, amplitude_deg);
     Ok(sway.ok_or(Unidentified::NotMeasured))
 }
 
 /// # Errors
-/// The value, which stands before both ends of its interval, lies outside of it.
-fn refuse_outside(value_and_ends: &[f64], name: &str, cell: &str) -> Result<(), String> {
-    match value_and_ends {
-        [value, lo, hi] if value < lo || value > hi => Err(format!(
+/// The value lies outside of its interval.
+fn refuse_outside([value, lo, hi]: [f64; 3], name: &str, cell: &str) -> Result<(), String> {
+    match value < lo || value > hi {
+        true => Err(format!(
             "{name} is {cell:?}, and must lie between {lo} and {hi}"
         )),
-        _ => Ok(()),
+        false => Ok(()),
     }
-}
-
-/// The number of a cell; NaN of an empty one.
-fn number(cell: &str, name: &str) -> Result<f64, String> {
-    if cell.is_empty() {
-        return Ok(f64::NAN);
-    }
-    let number = cell.parse().ok().filter(|x: &f64| x.is_finite());
-    number.ok_or_else(|| format!("{name} is {cell:?}, and must be a number"))
 }

@@ -7,7 +7,7 @@ use super::error::DocumentError;
 use super::number;
 use crate::files::{TableFault, WriteError};
 use crate::model::{FARTHEST_PX, NodeName};
-use csv::{ErrorKind, Position, Reader, ReaderBuilder, StringRecord};
+use csv::{ErrorKind, Position, Reader, StringRecord};
 use nalgebra::Point3;
 use std::fs::File;
 use std::io::{self, Read, Write};
@@ -164,8 +164,7 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// # Errors
     /// It cannot be read, or lacks a column.
     pub fn new(file: PathBuf, from: R, columns: [&str; N]) -> Result<Self, DocumentError> {
-        // Rows that lack what is asked for are refused by us; others may be short.
-        let mut reader = ReaderBuilder::new().flexible(true).from_reader(from);
+        let mut reader = Reader::from_reader(from);
         let header = reader.headers().map_err(|e| explain(&file, e))?.clone();
         let mut places = [0; N];
         for (place, name) in places.iter_mut().zip(columns) {
@@ -186,16 +185,11 @@ impl<R: Read, const N: usize> TableReader<R, N> {
     /// Takes the next row; `false` at the end.
     ///
     /// # Errors
-    /// The file cannot be read, or is no text there, or the row lacks a column that was asked for, as where the file was
-    /// cut off.
+    /// The file cannot be read, or is no text there, or the row has not as many cells as the first line, as where the
+    /// file was cut off.
     pub fn next(&mut self) -> Result<bool, DocumentError> {
         let read = self.reader.read_record(&mut self.row);
-        let is_there = read.map_err(|e| explain(&self.file, e))?;
-        let (cells, columns) = (self.row.len(), self.header.len());
-        match is_there && self.columns.iter().any(|column| *column >= cells) {
-            true => Err(self.bad(TableFault::of_length(cells, columns))),
-            false => Ok(is_there),
-        }
+        read.map_err(|e| explain(&self.file, e))
     }
 
     /// The cell of the `i`-th column that was asked for.
@@ -236,23 +230,27 @@ impl<R: Read, const N: usize> TableReader<R, N> {
             .parse()
             .ok()
             .filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
-        number.ok_or_else(|| self.no_number(i, name))
+        number.ok_or_else(|| self.bad(number::is_none(self.cell(i), name)))
     }
 
-    /// A number, which may be infinite or none; none in an empty cell.
+    /// A number that may be unknown, see [`number::known`].
     ///
     /// # Errors
     /// The cell holds words.
-    pub fn any_number(&self, i: usize, name: &str) -> Result<f64, DocumentError> {
-        match self.cell(i) {
-            "" => Ok(f64::NAN),
-            cell => cell.parse().map_err(|_| self.no_number(i, name)),
-        }
+    pub fn known(&self, i: usize, name: &str) -> Result<Option<f64>, DocumentError> {
+        number::known(self.cell(i), name).map_err(|what| self.bad(what))
     }
 
-    fn no_number(&self, i: usize, name: &str) -> DocumentError {
-        let cell = self.cell(i);
-        self.bad(format!("{name} is {cell:?}, and must be a number"))
+    /// The same of an [`optional`](Self::optional) column; unknown where the file lacks it.
+    ///
+    /// # Errors
+    /// The cell holds words.
+    pub fn known_optional(
+        &self,
+        column: Option<usize>,
+        name: &str,
+    ) -> Result<Option<f64>, DocumentError> {
+        number::known(self.optional_cell(column), name).map_err(|what| self.bad(what))
     }
 
     /// A length of the model in pixels, `px` of them to the file's unit.

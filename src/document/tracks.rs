@@ -313,11 +313,19 @@ impl DepthColumns {
     }
 
     /// What the present row says; `None` where the depth camera saw nothing.
-    fn seen(&self, table: &TableReader<File, 6>) -> Option<DepthSeen> {
-        let number = |column| table.optional_cell(column).parse::<f32>().ok();
-        let (depth_m, sd_m) = (number(self.depth_m)?, number(self.sd_m)?);
-        let is_depth = depth_m.is_finite() && depth_m > 0.0 && sd_m.is_finite();
-        is_depth.then_some(DepthSeen { depth_m, sd_m })
+    ///
+    /// # Errors
+    /// A cell holds words.
+    fn seen(&self, table: &TableReader<File, 6>) -> Result<Option<DepthSeen>, DocumentError> {
+        let depth_m = table.known_optional(self.depth_m, "depth_m")?;
+        let sd_m = table.known_optional(self.sd_m, "depth_sd_m")?;
+        Ok(match (depth_m, sd_m) {
+            (Some(depth_m), Some(sd_m)) if depth_m > 0.0 => Some(DepthSeen {
+                depth_m: depth_m as f32,
+                sd_m: sd_m as f32,
+            }),
+            _ => None,
+        })
     }
 }
 
@@ -370,14 +378,14 @@ impl<'a> TracksReader<'a> {
             return Ok(None);
         }
         // A point that is nowhere has no place, as it was not seen.
-        let u_px = table.any_number(3, "u_px")? as f32;
-        let v_px = table.any_number(4, "v_px")? as f32;
+        let u_px = table.known(3, "u_px")?.unwrap_or(f64::NAN) as f32;
+        let v_px = table.known(4, "v_px")?.unwrap_or(f64::NAN) as f32;
         let mut row = TrackRow {
             time_s: table.number(2, "time_s")?,
             observation: at_px(TrackId(table.whole(0, "track_id")?), u_px, v_px),
             node: None,
         };
-        row.observation.depth = self.depth.seen(table);
+        row.observation.depth = self.depth.seen(table)?;
         if !table.cell(5).is_empty() {
             let name = NodeName(table.whole(5, "node_id")?);
             let node = self.by_name.get(&name).copied();

@@ -11,20 +11,13 @@ pub struct TableFault {
     pub what: String,
 }
 
-impl TableFault {
-    /// What is wrong with a row of so many cells below a first line of `columns`.
-    pub fn of_length(cells: impl std::fmt::Display, columns: impl std::fmt::Display) -> String {
-        format!("it has {cells} cells, and the first line {columns}")
-    }
-}
-
 impl From<&Error> for TableFault {
     fn from(e: &Error) -> Self {
         let what = match e.kind() {
             ErrorKind::Utf8 { .. } => "it is no text".to_owned(),
             ErrorKind::UnequalLengths {
                 expected_len, len, ..
-            } => Self::of_length(*len, *expected_len),
+            } => format!("it has {len} cells, and the first line {expected_len}"),
             _ => "it cannot be read as a table".to_owned(),
         };
         let line = e.position().map_or(1, Position::line);

@@ -2,7 +2,7 @@
 //! al. 2013; SimpleTree).
 
 use super::chain::continuations;
-use crate::model::Skeleton;
+use crate::model::{BotanicalBranches, Skeleton};
 use crate::shape::Limb;
 use nalgebra::Point3;
 
@@ -18,7 +18,7 @@ pub struct Cylinder {
     pub radius: f64,
     /// Number of the branch, from 0: limbs that go on in one another are one.
     pub branch: usize,
-    /// 0 for the trunk, one more for every branch that leaves: of branches that begin at the foot, 1.
+    /// 0 for the trunk, 1 for stems that begin at the foot beside it, one more for every branch that leaves.
     pub order: u32,
     /// The limb that it is a piece of.
     pub limb: usize,
@@ -41,8 +41,7 @@ pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder>
             goes_on[p] = Some(i);
         }
     }
-    let order_of = |limb: &Limb| branches.order(limb.node);
-    let mut cylinders = pieces(limbs, &goes_on, order_of);
+    let mut cylinders = pieces(limbs, &goes_on, &branches);
     thin_within_carriers(&mut cylinders);
     cylinders
 }
@@ -73,29 +72,29 @@ fn thin_within_carriers(cylinders: &mut [Cylinder]) {
     }
 }
 
-/// The cylinders of limbs; `goes_on` holds the limb in which each goes on, and `order_of` says the order of one
-/// that is no twig.
+/// The cylinders of limbs; `goes_on` holds the limb in which each goes on, and `branches` the order of one that is
+/// no twig.
 fn pieces(
     limbs: &[Limb],
     goes_on: &[Option<usize>],
-    order_of: impl Fn(&Limb) -> u32,
+    branches: &BotanicalBranches,
 ) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch with its order.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
     let mut branch_of: Vec<(usize, u32)> = Vec::with_capacity(limbs.len());
-    let mut branches = 0;
+    let mut n_branches = 0;
     for (i, limb) in limbs.iter().enumerate() {
         let parent = limb.parent.filter(|&p| p < i);
         let (branch, order) = match parent {
             Some(p) if goes_on[p] == Some(i) => branch_of[p],
             _ => {
-                branches += 1;
+                n_branches += 1;
                 let order = match parent.filter(|_| limb.twig) {
                     Some(p) => branch_of[p].1 + 1,
-                    None => order_of(limb),
+                    None => branches.order(limb.node),
                 };
-                (branches - 1, order)
+                (n_branches - 1, order)
             }
         };
         branch_of.push((branch, order));
@@ -147,4 +146,31 @@ fn nearest(cylinders: &[Cylinder], range: std::ops::Range<usize>, limb: &Limb) -
         .map(|k| (cylinders[k].distance_to(&base), k))
         .min_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, k)| k)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A thick trunk, and a branch that begins in its middle.
+    #[test]
+    fn a_branch_is_no_thicker_within_its_carrier_than_where_it_comes_out() {
+        let piece = |parent, branch, from: [f64; 3], to: [f64; 3], radius| Cylinder {
+            parent,
+            start: from.into(),
+            end: to.into(),
+            radius,
+            branch,
+            order: branch as u32,
+            limb: branch,
+        };
+        let mut table = [
+            piece(None, 0, [0.0, 0.0, 0.0], [0.0, 50.0, 0.0], 10.0),
+            piece(Some(0), 1, [0.0, 40.0, 0.0], [4.0, 44.0, 0.0], 9.0),
+            piece(Some(1), 1, [4.0, 44.0, 0.0], [12.0, 52.0, 0.0], 7.0),
+            piece(Some(2), 1, [12.0, 52.0, 0.0], [30.0, 70.0, 0.0], 4.0),
+        ];
+        thin_within_carriers(&mut table);
+        assert_eq!(table.map(|c| c.radius), [10.0, 4.0, 4.0, 4.0]);
+    }
 }

@@ -89,14 +89,22 @@ impl Attractors {
         pairs.map(|(d, lower)| f64::from(d - lower.sqrt())).sum()
     }
 
-    /// The attractors that are farther from the tree than `least_px`, the farthest first.
-    pub fn beyond(&self, least_px: f64) -> Vec<Point2<f64>> {
-        let pairs = self.places.iter().zip(&self.nearest_px);
-        let mut far: Vec<_> = pairs.filter(|(_, d)| f64::from(**d) > least_px).collect();
-        far.sort_by(|(_, a), (_, b)| b.total_cmp(a));
-        far.into_iter()
-            .map(|(place, _)| place.cast().xy())
-            .collect()
+    /// The attractors that are farther from the tree than `least_px`, by their numbers, the farthest first.
+    pub fn beyond(&self, least_px: f64) -> Vec<usize> {
+        let all = 0..self.places.len();
+        let mut far: Vec<usize> = all.filter(|i| self.distance_px(*i) > least_px).collect();
+        far.sort_by(|a, b| self.nearest_px[*b].total_cmp(&self.nearest_px[*a]));
+        far
+    }
+
+    /// How far an attractor is from the tree, px.
+    pub fn distance_px(&self, attractor: usize) -> f64 {
+        self.nearest_px[attractor].into()
+    }
+
+    /// Where an attractor is in the picture, model axes, px.
+    pub fn place(&self, attractor: usize) -> Point2<f64> {
+        self.places[attractor].cast().xy()
     }
 
     /// How far the attractors are from the tree, px in their mean.

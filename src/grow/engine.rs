@@ -7,12 +7,12 @@
 //! pruned before it counts.
 //!
 //! Subtrees are as long as what carries them, so that where no branch is seen they come nowhere near the leaves, as
-//! in the upper half of a dense crown. In the end limbs lead there, each from the branch that is nearest and runs
-//! that way.
+//! in the upper half of a dense crown. So limbs that leaves hide, and that are thick there, go on first; and in the end
+//! limbs lead to what is left, each from the branch that is nearest and runs that way. Neither is of the paper.
 
 use super::attractors::Attractors;
-use super::library::{Library, Subtree, frame};
-use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, RADIUS_SHARE, Skeleton};
+use super::library::{Library, Subtree, frame, radius_share};
+use crate::model::{Node, NodeId, NodeKind, NodeName, Outline, Skeleton};
 use crate::random::Generator;
 use nalgebra::{Point2, Point3, Rotation3, Unit, Vector3};
 use rand::RngExt;
@@ -27,22 +27,33 @@ const TURNS: u32 = 12;
 const IDLE_ROUNDS: usize = 12;
 /// Least gain of a round for each new branch, by the distance between attractors in the picture.
 const LEAST_GAIN: f64 = 2.0;
-/// An attractor this many times as far from the tree as attractors are from one another gets a limb of its own.
+/// An attractor this many times as far from the tree as attractors are from one another gets a limb of its own
+/// (docs/design/photo.md, "Limbs where no branch is seen").
 const FAR_STEPS: f64 = 1.5;
-/// Places along a branch from which such a limb may leave, and how many of the nearest are tried.
+/// Shares of a branch's length at which such a limb may leave it, as branches do along all but its lowest part; and how many
+/// of these places are tried, the cheapest first: enough to try other branches than the nearest.
 const LIMB_SHARES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const LIMB_ORIGINS: usize = 24;
-/// Depths that are tried for its end, and how steep it is out of the picture at most, degrees.
+/// Depths that are tried for its end, by chance, and how steep it is out of the picture at most, degrees: 20 and 60 are
+/// as good (ibid.).
 const LIMB_DEPTHS: usize = 6;
 const STEEPEST_DEG: f64 = 45.0;
+/// A tip that is seen is thick if its radius is so many times that of the thinnest branch. It goes on for this share of the
+/// way that there is, as leaves are farther out than wood, by so many steps of attractors at most (there are about
+/// twenty across a crown), and tapers to this share of its radius.
+const THICK_TIP: f64 = 3.0;
+const EXTENDED: f64 = 0.8;
+const MOST_EXTENDED: u32 = 20;
+const EXTENDED_RADIUS: f64 = 0.3;
 /// Nothing grows on a branch shorter than this share of the tree's height.
 const SHORTEST: f64 = 0.02;
 /// A new branch ends at least this share of its length away from all other branches.
 const CLEAR: f64 = 0.2;
 /// Places along a branch at which its distance from attractors is looked at, at least, and whether it is
-/// inside. Along a long one they are as far apart as attractors.
+/// inside. Along a long one they are as far apart as attractors; no branch has more.
 const SAMPLES: u32 = 3;
 const LOOKED_AT: u32 = 5;
+const MOST_SAMPLES: u32 = 10_000;
 /// A place nearer than this share of its branch's length to a joint is that joint.
 const SAME_JOINT: f64 = 0.08;
 /// Generations of branches on the trunk, at most.
@@ -54,8 +65,8 @@ pub struct GrowthRegion<'a> {
     pub tree: &'a Outline,
     /// Whether a branch may run from one place to another (model axes, px).
     pub room: &'a dyn Fn(&Point3<f64>, &Point3<f64>) -> bool,
-    /// The attractors in space are used, too; without them the tree is flat from the side (Tan et al.
-    /// 2008 fig. 6).
+    /// The attractors in space are used, too; without them the subtrees' tree is flat from the side (Tan et al.
+    /// 2008 fig. 6). Limbs lead out of the picture in any case.
     pub in_space: bool,
     /// Radius of the thinnest branch, px.
     pub tip_px: f64,
@@ -64,7 +75,9 @@ pub struct GrowthRegion<'a> {
 /// What became of a growth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Growth {
+    /// Of subtrees, and limbs.
     pub branches: usize,
+    /// Of subtrees.
     pub rounds: usize,
     /// How far the attractors in the picture are from a branch in their mean, before and after, px.
     pub before_px: f64,
@@ -72,7 +85,7 @@ pub struct Growth {
 }
 
 /// Grows branches on those of `tree`, which has no copies. They are of the kind `grown`, and stand
-/// after all others. There are `rounds` of subtrees and as many limbs at most.
+/// after all others. There are so many `rounds` of subtrees at most, and then limbs; with 0 nothing grows.
 pub fn grow_subtrees(
     tree: &mut Skeleton,
     library: &Library,
@@ -82,6 +95,9 @@ pub fn grow_subtrees(
 ) -> Growth {
     let mut engine = Engine::new(tree, library, region);
     let before_px = engine.in_picture.mean_px();
+    if rounds > 0 {
+        engine.extend_thick_tips();
+    }
     let (mut idle, mut done) = (0, 0);
     while done < rounds && idle < IDLE_ROUNDS {
         let in_space = region.in_space && done % 2 == 1 && !engine.in_space.is_empty();
@@ -89,10 +105,8 @@ pub fn grow_subtrees(
         idle = if has_grown { 0 } else { idle + 1 };
         done += 1;
     }
-    for _ in 0..rounds {
-        if !engine.lead_limb(random) {
-            break;
-        }
+    if rounds > 0 {
+        engine.lead_limbs(random);
     }
     let growth = Growth {
         branches: engine.branches.iter().filter(|b| b.is_grown).count(),
@@ -142,6 +156,12 @@ struct Candidate {
     branch: usize,
     shoots: Vec<Shoot>,
     gain: f64,
+}
+
+/// A shoot on a branch of the tree.
+struct Limb {
+    branch: usize,
+    shoot: Shoot,
 }
 
 /// A place on a branch from which a limb may leave.
@@ -210,7 +230,12 @@ impl<'a> Engine<'a> {
         let mut samples = Vec::new();
         for joint in &engine.joints {
             if let Some(parent) = joint.parent {
-                sample(engine.joints[parent].at, joint.at, step_px, &mut samples);
+                samples.extend(samples_between(
+                    engine.joints[parent].at,
+                    joint.at,
+                    SAMPLES,
+                    step_px,
+                ));
             }
         }
         engine.take(samples);
@@ -281,26 +306,63 @@ impl<'a> Engine<'a> {
         let least_px = LEAST_GAIN * self.in_picture.step_px;
         match best {
             Some(best) if best.gain > least_px * best.shoots.len() as f64 => {
-                self.add(&best);
+                self.add(best.branch, &best.shoots);
                 true
             }
             _ => false,
         }
     }
 
-    /// Leads a limb to the attractor in the picture that is farthest from the tree and can be reached; `false` where
-    /// there is none.
-    fn lead_limb(&mut self, random: &mut Generator) -> bool {
-        let targets = self.in_picture.beyond(FAR_STEPS * self.in_picture.step_px);
-        let limb = targets.iter().find_map(|at| self.limb_to(*at, random));
-        if let Some(limb) = &limb {
-            self.add(limb);
+    /// Lets the limbs that are seen up to where leaves hide them, and are thick there, go on as they run.
+    fn extend_thick_tips(&mut self) {
+        for branch in 0..self.branches.len() {
+            let end = self.branches[branch].end;
+            let is_tip = !self.joints.iter().any(|joint| joint.parent == Some(end));
+            if is_tip && self.joints[end].radius > THICK_TIP * self.region.tip_px {
+                self.extend(branch);
+            }
         }
-        limb.is_some()
+    }
+
+    /// Lets a branch go on as it runs, most of the way to where the tree ends in the picture or in space.
+    fn extend(&mut self, branch: usize) {
+        let from = self.joints[self.branches[branch].end].at;
+        let Some(along) = self.vector(branch).try_normalize(1e-9) else {
+            return;
+        };
+        let shoot = |length: f64| Shoot {
+            on: None,
+            at: 1.0,
+            from,
+            to: from + length * along,
+            radius_share: EXTENDED_RADIUS,
+        };
+        let step_px = self.in_picture.step_px;
+        let lengths = (1..=MOST_EXTENDED).map(|k| f64::from(k) * step_px);
+        let free = lengths.take_while(|length| self.is_free(&shoot(*length), &[]));
+        if let Some(length) = free.last().filter(|length| *length > 2.0 * step_px) {
+            self.add(branch, &[shoot(EXTENDED * length)]);
+        }
+    }
+
+    /// Leads limbs to the attractors in the picture that are far from the tree, the farthest first. Those that cannot be
+    /// reached stay far.
+    fn lead_limbs(&mut self, random: &mut Generator) {
+        let far_px = FAR_STEPS * self.in_picture.step_px;
+        for attractor in self.in_picture.beyond(far_px) {
+            // An earlier limb may have come near.
+            if self.in_picture.distance_px(attractor) <= far_px {
+                continue;
+            }
+            let target = self.in_picture.place(attractor);
+            if let Some(limb) = self.limb_to(target, random) {
+                self.add(limb.branch, &[limb.shoot]);
+            }
+        }
     }
 
     /// A limb to a place in the picture (model axes, px), from a branch that is near and leads there.
-    fn limb_to(&self, target: Point2<f64>, random: &mut Generator) -> Option<Candidate> {
+    fn limb_to(&self, target: Point2<f64>, random: &mut Generator) -> Option<Limb> {
         let mut origins = self.limb_origins(target);
         origins.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         for origin in origins.into_iter().take(LIMB_ORIGINS) {
@@ -315,14 +377,11 @@ impl<'a> Engine<'a> {
                     at: origin.share,
                     from: origin.at,
                     to,
-                    radius_share: RADIUS_SHARE * length.min(1.0).sqrt(),
+                    radius_share: radius_share(length),
                 };
                 if self.is_free(&shoot, &[]) {
-                    return Some(Candidate {
-                        branch: origin.branch,
-                        shoots: vec![shoot],
-                        gain: 0.0,
-                    });
+                    let branch = origin.branch;
+                    return Some(Limb { branch, shoot });
                 }
             }
         }
@@ -332,10 +391,7 @@ impl<'a> Engine<'a> {
     /// Where a limb to a place in the picture may leave the tree.
     fn limb_origins(&self, target: Point2<f64>) -> Vec<LimbOrigin> {
         let mut origins = Vec::new();
-        for (branch, own) in self.branches.iter().enumerate() {
-            if own.generation >= MOST_GENERATIONS {
-                continue;
-            }
+        for branch in (0..self.branches.len()).filter(|b| self.may_bear(*b)) {
             let along = self.vector(branch).xy();
             for share in LIMB_SHARES {
                 let Some(at) = self.along(branch, share) else {
@@ -361,8 +417,7 @@ impl<'a> Engine<'a> {
     fn chosen(&self, random: &mut Generator) -> Vec<usize> {
         let mut drawn: Vec<(usize, f64)> = Vec::new();
         for (b, branch) in self.branches.iter().enumerate() {
-            let is_long = self.vector(b).norm() >= SHORTEST * self.height_px;
-            if is_long && branch.generation < MOST_GENERATIONS {
+            if self.may_bear(b) {
                 let key = random.random_range(0.0_f64..1.0);
                 drawn.push((b, key.powi(branch.generation.max(1) as i32)));
             }
@@ -370,6 +425,12 @@ impl<'a> Engine<'a> {
         drawn.sort_by(|(_, a), (_, b)| b.total_cmp(a));
         drawn.truncate(CANDIDATES);
         drawn.into_iter().map(|(b, _)| b).collect()
+    }
+
+    /// Whether anything may grow on a branch.
+    fn may_bear(&self, branch: usize) -> bool {
+        let is_long = self.vector(branch).norm() >= SHORTEST * self.height_px;
+        is_long && self.branches[branch].generation < MOST_GENERATIONS
     }
 
     /// From where a branch begins to its end.
@@ -419,12 +480,9 @@ impl<'a> Engine<'a> {
     /// Whether a shoot is inside, and ends clear of all branches and of its neighbours.
     fn is_free(&self, shoot: &Shoot, others: &[Shoot]) -> bool {
         let way = shoot.to - shoot.from;
-        let appears_inside = |k: &u32| {
-            let at = shoot.from + way * (f64::from(*k) / f64::from(LOOKED_AT));
-            let [u, v] = [self.foot_px.x + at.x, self.foot_px.y - at.y];
-            self.region.tree.contains(u, v)
-        };
-        if shoot.to.y < 0.0 || !(1..=LOOKED_AT).all(|k| appears_inside(&k)) {
+        let step_px = self.in_picture.step_px;
+        let mut along = samples_between(shoot.from, shoot.to, LOOKED_AT, step_px);
+        if shoot.to.y < 0.0 || !along.all(|at| self.appears_inside(&at)) {
             return false;
         }
         if !(self.region.room)(&shoot.from, &shoot.to) {
@@ -433,6 +491,11 @@ impl<'a> Engine<'a> {
         let clear_sq = (CLEAR * way.norm()).powi(2);
         let is_near = |at: &Point3<f64>| (at - shoot.to).norm_squared() < clear_sq;
         !others.iter().any(|other| is_near(&other.to)) && !self.samples.iter().any(is_near)
+    }
+
+    fn appears_inside(&self, at: &Point3<f64>) -> bool {
+        let [u, v] = [self.foot_px.x + at.x, self.foot_px.y - at.y];
+        self.region.tree.contains(u, v)
     }
 
     /// The place at a share of a branch's length along its bends.
@@ -504,11 +567,12 @@ impl<'a> Engine<'a> {
         joint
     }
 
-    fn add(&mut self, grown: &Candidate) {
-        let generation = self.branches[grown.branch].generation + 1;
-        let mut branch_of: Vec<usize> = Vec::with_capacity(grown.shoots.len());
-        for shoot in &grown.shoots {
-            let carrier = shoot.on.map_or(grown.branch, |on| branch_of[on]);
+    /// Adds shoots on a branch.
+    fn add(&mut self, branch: usize, shoots: &[Shoot]) {
+        let generation = self.branches[branch].generation + 1;
+        let mut branch_of: Vec<usize> = Vec::with_capacity(shoots.len());
+        for shoot in shoots {
+            let carrier = shoot.on.map_or(branch, |on| branch_of[on]);
             let begin = self.joint_at(carrier, shoot.at);
             let branch = self.branches.len();
             let radius = (shoot.radius_share * self.joints[begin].radius).max(self.region.tip_px);
@@ -527,8 +591,8 @@ impl<'a> Engine<'a> {
             });
             branch_of.push(branch);
         }
-        self.take(samples_of(&grown.shoots, self.in_picture.step_px));
-        for shoot in &grown.shoots {
+        self.take(samples_of(shoots, self.in_picture.step_px));
+        for shoot in shoots {
             self.attract_quarter_turned(shoot.to);
         }
     }
@@ -614,18 +678,22 @@ struct PlaceAlong {
     same: f64,
 }
 
-/// Places from one to another, `step_px` apart at most.
-fn sample(from: Point3<f64>, to: Point3<f64>, step_px: f64, into: &mut Vec<Point3<f64>>) {
-    let count = ((to - from).norm() / step_px).ceil().min(1e4) as u32;
-    let count = count.max(SAMPLES);
-    let shares = (1..=count).map(|k| f64::from(k) / f64::from(count));
-    into.extend(shares.map(|share| from + share * (to - from)));
+/// Places behind one up to another, `least` of them, and `step_px` apart at most.
+fn samples_between(
+    from: Point3<f64>,
+    to: Point3<f64>,
+    least: u32,
+    step_px: f64,
+) -> impl Iterator<Item = Point3<f64>> {
+    let steps = ((to - from).norm() / step_px).ceil() as u32;
+    let count = steps.clamp(least, MOST_SAMPLES);
+    (1..=count).map(move |k| from + f64::from(k) / f64::from(count) * (to - from))
 }
 
 fn samples_of(shoots: &[Shoot], step_px: f64) -> Vec<Point3<f64>> {
-    let mut samples = Vec::with_capacity(SAMPLES as usize * shoots.len());
+    let mut samples = Vec::new();
     for shoot in shoots {
-        sample(shoot.from, shoot.to, step_px, &mut samples);
+        samples.extend(samples_between(shoot.from, shoot.to, SAMPLES, step_px));
     }
     samples
 }
@@ -728,17 +796,25 @@ mod tests {
         let mut seen = Skeleton::forked();
         seen.nodes.truncate(3);
         let library = Library::predefined(SubtreeKind::Both);
-        let farthest = |rounds: usize| {
-            let mut tree = seen.clone();
-            let random = &mut generator(5, 0);
-            grow_subtrees(&mut tree, &library, &region, rounds, random);
-            let engine = Engine::new(&tree, &library, &region);
-            let away = |steps: f64| engine.in_picture.beyond(steps * engine.in_picture.step_px);
-            (away(2.0).len(), away(0.0).len())
+        let n_far = |tree: &Skeleton| {
+            let engine = Engine::new(tree, &library, &region);
+            let far_px = FAR_STEPS * engine.in_picture.step_px;
+            engine.in_picture.beyond(far_px).len()
         };
-        let (before, all) = farthest(0);
-        assert!(3 * before > all, "{before} of {all}");
-        assert_eq!(farthest(ROUNDS).0, 0);
+        let before = n_far(&seen);
+        assert!(before > 100, "{before}");
+        let mut by_subtrees = seen.clone();
+        let mut engine = Engine::new(&by_subtrees, &library, &region);
+        let random = &mut generator(5, 0);
+        for round in 0..ROUNDS {
+            engine.round(round % 2 == 1, random);
+        }
+        by_subtrees = engine.skeleton();
+        let left = n_far(&by_subtrees);
+        assert!(left > 0);
+        let mut grown = seen.clone();
+        grow_subtrees(&mut grown, &library, &region, ROUNDS, &mut generator(5, 0));
+        assert_eq!(n_far(&grown), 0, "{left} by subtrees");
     }
 
     #[test]

@@ -136,10 +136,15 @@ fn ready_made(stems: &[Stem]) -> Subtree {
             on: None,
             at: stem.at,
             way: turn * leaning,
-            radius_share: RADIUS_SHARE * stem.length.min(1.0).sqrt(),
+            radius_share: radius_share(stem.length),
         });
     }
     subtree
+}
+
+/// The radius of a new branch by that of what carries it, if it is so long by it.
+pub(super) fn radius_share(length: f64) -> f64 {
+    RADIUS_SHARE * length.min(1.0).sqrt()
 }
 
 /// The subtrees of all branches on which something grows.

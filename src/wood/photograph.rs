@@ -97,13 +97,14 @@ pub struct SeenInPhotograph {
     /// The share of the length of all that was traced that runs level, as edges of buildings do; those that were
     /// taken off count.
     pub level_share: f64,
-    /// Leaves were looked for as green, and half of the crown is red.
-    pub may_have_red_leaves: bool,
+    /// The colour of half of the crown, which may be leaves that were not looked for: red where they were looked for as
+    /// green, and both where the tree was said to be bare.
+    pub other_leaves: Option<LeafColour>,
 }
 
 /// Where so much of a crown is red it is leaves: of 20 made ones in autumn at least 0.60; of bare crowns before
 /// walls of brick at most 0.38. Green is of the same pixels where they are yellow.
-const RED_SHARE: f64 = 0.5;
+const LEAFY_SHARE: f64 = 0.5;
 const GREEN_SHARE: f64 = 0.25;
 
 /// Of 40 made photographs with strokes one tree has more than this share of its length that runs level: it is
@@ -261,10 +262,22 @@ pub fn beside_leaves(
         doubtful: on_strokes.doubtful,
         is_as_around: mask.in_leaf && is_as_around,
         level_share,
-        may_have_red_leaves: photo.leaves == LeafHint::Unknown
-            && share_of(photo.picture, within, LeafColour::Red) > RED_SHARE
-            && share_of(photo.picture, within, LeafColour::Green) < GREEN_SHARE,
+        other_leaves: other_leaves(photo, within),
     })
+}
+
+/// The colour of leaves that may be there and were not looked for.
+fn other_leaves(photo: Photograph, within: &[u8]) -> Option<LeafColour> {
+    let share = |colour: LeafColour| share_of(photo.picture, within, colour);
+    match photo.leaves {
+        LeafHint::Of(_) => None,
+        LeafHint::Bare if share(LeafColour::Green) > LEAFY_SHARE => Some(LeafColour::Green),
+        LeafHint::Bare | LeafHint::Unknown => {
+            let is_red =
+                share(LeafColour::Red) > LEAFY_SHARE && share(LeafColour::Green) < GREEN_SHARE;
+            is_red.then_some(LeafColour::Red)
+        }
+    }
 }
 
 /// The pixels within `region` that are more likely wood than not.
@@ -449,22 +462,27 @@ struct Carries {
     kept: usize,
 }
 
-/// Sets the radius of pieces that leaves hide to 0, and of those that go on behind leaves alone: a stroke through
-/// leaves is a branch, and is no measure of its width, and where leaves begin the width is what they leave of it.
+/// A piece has no radius if leaves hide it: a stroke through leaves is a branch, and is no measure of its width. Nor has
+/// one of which all that goes on is hidden, for there leaves cover a part of its width; unless none below it is seen.
 fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
     let nodes = &mut branches.nodes;
     let mut is_hidden = vec![false; nodes.len()];
-    let mut above: Vec<Carries> = vec![Carries::default(); nodes.len()];
+    let mut ends_in_leaves = vec![false; nodes.len()];
+    let mut goes_on_in_sight = vec![false; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
         let Some(parent) = node.parent else { continue };
         let share = hidden_share(nodes[parent].position_px, node.position_px, leaves, size);
         is_hidden[i] = share > HIDDEN;
-        above[parent].all += 1;
-        above[parent].kept += usize::from(!is_hidden[i]);
+        match is_hidden[i] {
+            true => ends_in_leaves[parent] = true,
+            false => goes_on_in_sight[parent] = true,
+        }
     }
-    for ((node, is_hidden), above) in nodes.iter_mut().zip(is_hidden).zip(above) {
-        if is_hidden || (above.all > 0 && above.kept == 0) {
-            node.radius_px = 0.0;
+    for i in 1..nodes.len() {
+        let is_seen_below = nodes[i].parent.is_some_and(|p| p > 0 && !is_hidden[p]);
+        let is_last = ends_in_leaves[i] && !goes_on_in_sight[i];
+        if is_hidden[i] || is_last && is_seen_below {
+            nodes[i].radius_px = 0.0;
         }
     }
 }
@@ -663,6 +681,26 @@ mod tests {
         for (wood, leaf) in masks.wood.pixels.iter().zip(&masks.leaves.pixels) {
             assert!(u32::from(*wood) + u32::from(*leaf) <= 255);
         }
+    }
+
+    #[test]
+    fn the_last_width_before_leaves_is_none_unless_it_is_the_only_one() {
+        let leaves: Vec<u8> = (0..SIZE.area())
+            .map(|i| if i / 320 < 96 { 255 } else { 0 })
+            .collect();
+        let radii = |heights: &[f64]| {
+            let mut graph = BranchGraph::default();
+            for (i, v) in heights.iter().enumerate() {
+                let node = WoodNode::made_up(i.checked_sub(1), 100.0, *v);
+                graph.nodes.push(node);
+            }
+            hide_radii(&mut graph, &leaves, SIZE);
+            let seen = graph.nodes[1..].iter().map(|n| n.radius_px > 0.0);
+            seen.collect::<Vec<bool>>()
+        };
+        assert_eq!(radii(&[200.0, 150.0, 100.0, 20.0]), [true, false, false]);
+        assert_eq!(radii(&[200.0, 100.0, 20.0]), [true, false]);
+        assert_eq!(radii(&[200.0, 150.0, 100.0]), [true, true]);
     }
 
     #[test]

@@ -896,7 +896,7 @@ fn large(dir: &Path, nodes: usize, parent: impl Fn(usize) -> usize) {
         levels.push(if i == 0 { 0 } else { levels[parent(i)] + 1 });
         let (x, y) = (i % 400, i / 400 + if i == 0 { 0 } else { 50 });
         table.push(format!(
-            "{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false,,,not_measured,measured,,,0",
+            "{i},{above},{},1,0,0,{x},{y},{},1,,,,,,,false,,,not_measured,measured,,,0,,,",
             levels[i],
             i % 100
         ));

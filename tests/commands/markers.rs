@@ -143,13 +143,15 @@ fn said(output: &Output) -> String {
 
 /// The branches that `analyze` finds in a capture.
 fn branches(scene: &Scene, arguments: &str) -> Vec<serde_json::Value> {
+    listed(scene, arguments, "branches")
+}
+
+/// A list of what `analyze` finds in a capture.
+fn listed(scene: &Scene, arguments: &str, what: &str) -> Vec<serde_json::Value> {
     let output = scene.run(&format!("analyze {arguments} --json"));
     assert!(output.status.success(), "{}", said(&output));
     let all: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    all["captures"][0]["branches"]
-        .as_array()
-        .expect("branches")
-        .clone()
+    all["captures"][0][what].as_array().expect("a list").clone()
 }
 
 #[test]
@@ -184,6 +186,17 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
     let named: Vec<&str> = found.iter().filter_map(|b| b["branch"].as_str()).collect();
     assert_eq!(named, ["A", "B"]);
     assert_eq!(found[1]["parent_id"], found[0]["node_id"]);
+    // Modes are called as the markers are, not as limbs.
+    let modes = listed(&scene, "out --markers", "modes");
+    let of_modes: Vec<&str> = modes.iter().filter_map(|m| m["branch"].as_str()).collect();
+    assert_eq!(of_modes, ["A", "B"]);
+    for limb in modes
+        .iter()
+        .flat_map(|m| m["energy"].as_array().expect("energy"))
+    {
+        let limb = limb["limb"].as_str().expect("a name");
+        assert!(["A", "B"].contains(&limb), "{limb}");
+    }
     for (branch, hz) in found.iter().zip([TRUNK_HZ, BRANCH_HZ]) {
         let peak = branch["spectrum_peak_hz"].as_f64().expect("a peak");
         assert!((peak - hz).abs() < 0.05, "{peak} for {hz}");

@@ -56,7 +56,7 @@ pub struct AnalyzeArgs {
     /// Profile of the camera's lens (JSON of Gyroflow's lens_profiles, or from config/lenses): points are
     /// put where a camera without distortion would show them, and at the time at which their row is read.
     #[arg(long, value_name = "FILE", value_parser = lens, conflicts_with = "update")]
-    pub lens: Option<Lens>,
+    pub lens: Option<LensProfile>,
     /// Time in which a rolling shutter reads a frame from its first to its last row, ms; over that of the
     /// lens profile.
     #[arg(long, value_name = "MS", value_parser = readout, conflicts_with = "update")]
@@ -75,10 +75,20 @@ enum ExcitationArg {
     Wind,
 }
 
+/// A lens by its profile.
+#[derive(Clone, Debug)]
+pub struct LensProfile {
+    pub file: String,
+    pub lens: Lens,
+}
+
 /// Reads a lens profile.
-fn lens(path: &str) -> Result<Lens, String> {
+fn lens(path: &str) -> Result<LensProfile, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{e}; give a file"))?;
-    read_lens_profile(&bytes)
+    Ok(LensProfile {
+        file: path.to_owned(),
+        lens: read_lens_profile(&bytes)?,
+    })
 }
 
 /// Parses the time in which a frame is read, ms.

@@ -39,9 +39,37 @@ fn text_has_its_places_in_named_columns_and_no_decimal_commas() {
         expected(&read_bytes(text.as_bytes(), CloudFormat::Text).expect(names));
     }
     expected(&read_bytes(TEXT.replace(' ', ", ").as_bytes(), CloudFormat::Text).expect("parted"));
-    let commas = read_bytes(b"1,25 2,5 3,75\n", CloudFormat::Text).expect_err("decimal commas");
-    let what = commas.to_string();
-    assert!(what.contains("line 1 has white space and commas"), "{what}");
+    for (text, what) in [
+        ("1,25 2,5 3,75\n", "line 1 has white space and commas"),
+        ("1,2;2,5;3,7\n", "line 1 has semicolons and commas"),
+        (
+            "id,x,y,z\n1,2,3\n",
+            "line 1 names 4 columns, and line 2 has others",
+        ),
+        ("1 2 3\n4 5 six\n", "line 2 has no place of a point"),
+    ] {
+        let refused = read_bytes(text.as_bytes(), CloudFormat::Text).expect_err(what);
+        assert!(refused.to_string().contains(what), "{refused}");
+    }
+}
+
+/// Cells are counted as the names are: an empty one is one, and a space within a name parts none.
+#[test]
+fn text_of_other_programs_is_read_as_it_is_meant() {
+    for text in [
+        "Point ID,X,Y,Z,Intensity\n7,1,2,3,200\n7,1,nan,3,200\n7,4,5.5,6,200\n",
+        "id,name,x,y,z\n7,,1,2,3\n7,,1,nan,3\n7,,4,5.5,6\n",
+        "# format: x y z intensity\n1 2 3 9\n1 nan 3 9\n4 5.5 6 9\n",
+        "\u{feff}1 2 3\n1 nan 3\n4 5.5 6\n",
+        "3\n1 2 3\n1 nan 3\n4 5.5 6\n",
+        "id x y z\n3\n7 1 2 3\n7 1 nan 3\n7 4 5.5 6\n",
+        "Easting,Northing,Height,Scan angle\n1,2,3,0\n1,nan,3,0\n4,5.5,6,0\n",
+        "1.0,2.0,3.0,2023-01-01 12:00:00\n1,nan,3,-\n4,5.5,6,one oak\n",
+        "1 2 3 bark, moss\n1 nan 3\n4 5.5 6\n",
+    ] {
+        let cloud = read_bytes(text.as_bytes(), CloudFormat::Text);
+        expected(&cloud.unwrap_or_else(|e| panic!("{text}: {e}")));
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A point on each line.
 
 use super::Points;
+use crate::files::without_byte_order_mark;
 use crate::import::error::ImportError;
 use std::io::{BufRead, Read};
 
@@ -9,85 +10,161 @@ const LONGEST_LINE: u64 = 4096;
 /// Lines before the first point that may be of another kind: names of columns, a number of points.
 const MOST_HEADER_LINES: usize = 16;
 
-/// Reads three numbers of every line: those in the columns that a line before the first point calls x, y and z, or else
-/// the first three. They are parted by white space, by commas or by semicolons, not by two of these. Other lines
-/// that begin with `#` or `//` do not count.
+/// What parts the cells of a line, tried in this order; `None` is white space.
+const SEPARATORS: [Option<char>; 3] = [Some(';'), Some(','), None];
+
+/// Reads three numbers of every line: those in the columns that a line before the first point calls x, y and z, or
+/// else the first three. Semicolons, commas or white space part them, and decimals have points. Other lines that begin
+/// with `#` or `//` do not count.
 ///
 /// # Errors
-/// A line is none of a point, or too long, or it may have decimal commas.
+/// A line is none of a point, or too long, or has other columns than the line of names, or may have decimal commas.
 pub(super) fn read(mut input: impl BufRead, points: &mut Points) -> Result<(), ImportError> {
     let mut line = Vec::new();
-    let mut others = 0;
+    let mut n_headers = 0;
     let mut has_points = false;
-    let mut columns = [0, 1, 2];
+    let mut columns = Columns::FIRST;
     for number in 1_u64.. {
         line.clear();
         let read = (&mut input).take(LONGEST_LINE).read_until(b'\n', &mut line);
         if read.map_err(|e| ImportError::unreadable(&e))? == 0 {
             break;
         }
-        let own = line.trim_ascii();
-        let is_comment = own.starts_with(b"#") || own.starts_with(b"//");
-        if !has_points && let Some(named) = named_columns(own) {
+        let text = String::from_utf8_lossy(&line);
+        let own = without_byte_order_mark(&text).trim();
+        if own.is_empty() {
+            continue;
+        }
+        if !has_points && let Some(named) = Columns::named(own, number) {
             columns = named;
             continue;
         }
-        if own.is_empty() || is_comment {
+        if is_comment(own) {
             continue;
         }
-        if has_decimal_commas(own) {
-            let others = match own.contains(&b';') {
-                true => "semicolons",
-                false => "white space",
-            };
-            return Err(ImportError::bad_format(format!(
-                "line {number} has {others} and commas; write numbers with decimal points"
-            )));
+        if own.contains(';') && own.contains(',') {
+            return Err(decimal_commas(number, "semicolons"));
         }
-        if let Some([x, y, z]) = place(own, columns) {
+        if !has_points {
+            columns = columns.of_points_as(own, number)?;
+        }
+        if let Some([x, y, z]) = columns.place(own) {
             points.push(x, y, z)?;
             has_points = true;
-        } else {
-            others += 1;
-            if has_points || others > MOST_HEADER_LINES {
-                return Err(ImportError::bad_format(format!(
-                    "line {number} does not have three numbers of a place"
-                )));
-            }
+            continue;
+        }
+        if has_commas_within(own) {
+            return Err(decimal_commas(number, "white space"));
+        }
+        n_headers += 1;
+        if has_points || n_headers > MOST_HEADER_LINES {
+            return Err(ImportError::bad_format(format!(
+                "line {number} has no place of a point: three numbers"
+            )));
         }
     }
     Ok(())
 }
 
-/// Which columns a line calls x, y and z; `None` if it has no such names.
-fn named_columns(line: &[u8]) -> Option<[usize; 3]> {
-    let text = std::str::from_utf8(line).ok()?;
-    let names: Vec<String> = words(text.trim_start_matches(['#', '/']))
-        .map(|name| name.trim_matches('"').to_ascii_lowercase())
-        .collect();
-    let column = |wanted: &str| names.iter().position(|name| name == wanted);
-    Some([column("x")?, column("y")?, column("z")?])
+fn is_comment(line: &str) -> bool {
+    line.starts_with('#') || line.starts_with("//")
 }
 
-/// Whether commas stand within what white space or semicolons part: they may be those of decimals.
-fn has_decimal_commas(line: &[u8]) -> bool {
-    let parts = line.split(|c| c.is_ascii_whitespace() || *c == b';');
-    let is_one = |part: &&[u8]| part.iter().any(|c| *c != b',');
-    let parts: Vec<&[u8]> = parts.filter(is_one).collect();
-    let has_inner = |part: &&[u8]| part.split(|c| *c == b',').filter(|p| !p.is_empty()).count() > 1;
-    parts.len() > 1 && parts.iter().any(has_inner)
+fn decimal_commas(number: u64, others: &str) -> ImportError {
+    ImportError::bad_format(format!(
+        "line {number} has {others} and commas; write numbers with decimal points"
+    ))
 }
 
-/// The numbers in these columns of a line.
-fn place(line: &[u8], columns: [usize; 3]) -> Option<[f64; 3]> {
-    let text = std::str::from_utf8(line).ok()?;
-    let words: Vec<&str> = words(text).collect();
-    let number = |column: usize| words.get(column)?.parse::<f64>().ok();
-    let [x, y, z] = columns.map(number);
-    Some([x?, y?, z?])
+/// Whether a line is of numbers alone, and has commas and white space: the commas may be those of decimals.
+fn has_commas_within(line: &str) -> bool {
+    let is_of_number = |c: char| c.is_ascii_digit() || "+-.,eE".contains(c) || c.is_whitespace();
+    line.chars().all(is_of_number) && line.contains(',') && line.contains(char::is_whitespace)
 }
 
-fn words(text: &str) -> impl Iterator<Item = &str> {
-    text.split(|c: char| c.is_ascii_whitespace() || c == ',' || c == ';')
-        .filter(|word| !word.is_empty())
+/// The cells of a line, without quotes. Where white space parts them, there are no empty ones.
+fn cells(line: &str, separator: Option<char>) -> impl Iterator<Item = &str> {
+    let parts = line.split(move |c: char| match separator {
+        Some(separator) => c == separator,
+        None => c.is_whitespace(),
+    });
+    parts
+        .map(|cell| cell.trim().trim_matches('"'))
+        .filter(move |cell| separator.is_some() || !cell.is_empty())
+}
+
+/// Where the numbers of a place stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Columns {
+    /// Of x, y and z, from 0.
+    at: [usize; 3],
+    /// The line that names them.
+    names: Option<Names>,
+}
+
+/// A line that names columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Names {
+    line: u64,
+    count: usize,
+    is_comment: bool,
+}
+
+impl Columns {
+    /// Those of points without names.
+    const FIRST: Self = Self {
+        at: [0, 1, 2],
+        names: None,
+    };
+
+    /// The columns that a line calls x, y and z; `None` if it has no such names.
+    fn named(line: &str, number: u64) -> Option<Self> {
+        let is_comment = is_comment(line);
+        let line = line.trim_start_matches(['#', '/']);
+        SEPARATORS.into_iter().find_map(|separator| {
+            let column = |wanted: &str| {
+                cells(line, separator).position(|name| name.eq_ignore_ascii_case(wanted))
+            };
+            Some(Self {
+                at: [column("x")?, column("y")?, column("z")?],
+                names: Some(Names {
+                    line: number,
+                    count: cells(line, separator).count(),
+                    is_comment,
+                }),
+            })
+        })
+    }
+
+    /// These columns, if the first point has as many cells as there are names, or this line is no point yet. A comment
+    /// that merely looks like names is none.
+    ///
+    /// # Errors
+    /// A line of names has another number of them.
+    fn of_points_as(self, point: &str, number: u64) -> Result<Self, ImportError> {
+        let Some(names) = self.names.filter(|_| self.at != Self::FIRST.at) else {
+            return Ok(self);
+        };
+        let is_of_points = |separator| cells(point, separator).count() == names.count;
+        let is_none = self.place(point).is_none() && Self::FIRST.place(point).is_none();
+        if is_none || SEPARATORS.into_iter().any(is_of_points) {
+            return Ok(self);
+        }
+        match names.is_comment {
+            true => Ok(Self::FIRST),
+            false => Err(ImportError::bad_format(format!(
+                "line {} names {} columns, and line {number} has others",
+                names.line, names.count
+            ))),
+        }
+    }
+
+    /// The place on a line; `None` where a number of it is missing.
+    fn place(&self, line: &str) -> Option<[f64; 3]> {
+        SEPARATORS.into_iter().find_map(|separator| {
+            let number = |column: usize| cells(line, separator).nth(column)?.parse::<f64>().ok();
+            let [x, y, z] = self.at.map(number);
+            Some([x?, y?, z?])
+        })
+    }
 }
