@@ -30,6 +30,8 @@ use written::{with_amplitudes, write_report};
 /// Longest part of a film that is analysed if one is chosen, s; of a longer part the end is used.
 /// Points of hours would fill the memory.
 const MAX_PART_S: f64 = 600.0;
+/// Points that end so long before the film were cut off, s.
+const LEAST_CUT_S: f64 = 1.0;
 
 /// The analysis of one capture.
 struct CaptureAnalysis {
@@ -199,6 +201,9 @@ fn analyse_capture(
         notes.add("note", undone);
     }
     let filmed = film(args, document, marked.as_ref(), &config, &mut notes)?;
+    if let Some(cut) = cut_off(&filmed, document).filter(|_| args.to.is_none()) {
+        notes.add("warning", cut);
+    }
     let take = Take::of(camera.film(&filmed));
     if let Some(warning) = take.warning() {
         notes.add("warning", warning);
@@ -429,6 +434,19 @@ fn excitation(setting: Excited) -> Option<Excitation> {
         Excited::Release => Some(Excitation::Release),
         Excited::Wind => Some(Excitation::Wind),
     }
+}
+
+/// What is said of points that end before the film does, though not all of them were lost.
+fn cut_off(film: &Film, document: &Document) -> Option<String> {
+    let note = &document.note;
+    let (last_s, duration_s) = (*film.times_s.last()?, note.timing.duration_s);
+    let is_cut = duration_s - last_s > LEAST_CUT_S && note.quality.tracks_alive_end > 0;
+    is_cut.then(|| {
+        format!(
+            "its points end at {last_s:.1} s, and the film at {duration_s:.1} s: tracks.csv was cut off; what follows \
+             is of a part of the film"
+        )
+    })
 }
 
 /// The tracked points to analyse. As at the end of a capture these are the points of the last

@@ -274,7 +274,7 @@ fn pull_aside(
             let found = (1..nodes.len()).find(|&i| nodes[i].name.0 == name);
             found.ok_or_else(|| {
                 CommandError::BadUsage(anyhow!(
-                    "--pull-node {name} is no node of this tree; see nodes.csv"
+                    "--pull-node {name} is no node of this tree that can be pulled; see nodes.csv"
                 ))
             })?
         }

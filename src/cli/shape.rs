@@ -19,7 +19,7 @@ pub struct ShapeArgs {
     #[arg(long, value_name = "FILE|auto", value_parser = Trunk::parse)]
     trunk: Option<Trunk>,
     /// Envelope of the branches: the outline rotated about its axis (`revolution`), the rotated
-    /// hull of the visible branches (`hull`), or, for `export` and `render`, a shape that the tree
+    /// hull of the visible branches (`hull`), or, for `export`, `render` and `animate`, a shape that the tree
     /// is cut to: the opaque part of an image, the white part of a mask, a photograph of a thing
     /// before a plain background, or a polygon (JSON).
     #[arg(long, value_name = "revolution|hull|FILE", value_parser = Envelope::parse)]

@@ -233,12 +233,16 @@ impl<R: Read, const N: usize> TableReader<R, N> {
         number.ok_or_else(|| self.bad(number::is_none(self.cell(i), name)))
     }
 
-    /// A number that may be unknown, see [`number::known`].
+    /// A place in the picture along one axis, px, that may be unknown, see [`number::known`].
     ///
     /// # Errors
-    /// The cell holds words.
-    pub fn known(&self, i: usize, name: &str) -> Result<Option<f64>, DocumentError> {
-        number::known(self.cell(i), name).map_err(|what| self.bad(what))
+    /// The cell holds words, or a place that no picture has.
+    pub fn known_px(&self, i: usize, name: &str) -> Result<Option<f64>, DocumentError> {
+        let known = number::known(self.cell(i), name).map_err(|what| self.bad(what))?;
+        match known.filter(|px| px.abs() > FARTHEST_PX) {
+            Some(px) => Err(self.bad(format!("{name} is {px}; no picture is so large"))),
+            None => Ok(known),
+        }
     }
 
     /// The same of an [`optional`](Self::optional) column; unknown where the file lacks it.

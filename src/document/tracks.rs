@@ -378,8 +378,8 @@ impl<'a> TracksReader<'a> {
             return Ok(None);
         }
         // A point that is nowhere has no place, as it was not seen.
-        let u_px = table.known(3, "u_px")?.unwrap_or(f64::NAN) as f32;
-        let v_px = table.known(4, "v_px")?.unwrap_or(f64::NAN) as f32;
+        let u_px = table.known_px(3, "u_px")?.unwrap_or(f64::NAN) as f32;
+        let v_px = table.known_px(4, "v_px")?.unwrap_or(f64::NAN) as f32;
         let mut row = TrackRow {
             time_s: table.number(2, "time_s")?,
             observation: at_px(TrackId(table.whole(0, "track_id")?), u_px, v_px),

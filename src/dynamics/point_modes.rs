@@ -7,9 +7,10 @@
 use super::branch_tree::BranchTree;
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
-use super::members::count_among;
+use super::members::{count_among, mean_px};
 use crate::model::{NodeId, Sway, Swaying, Unidentified};
 use nalgebra::Point2;
+use std::f64::consts::SQRT_2;
 
 /// A mode is a captured branch's own if it is in so many of its points at least, and if so much of
 /// the points that have it are on that.
@@ -100,10 +101,48 @@ impl PointMode {
             .is_ok_and(|answer| !own.overlaps(&answer.frequency_hz))
     }
 
+    /// The sway of a branch that begins at `base_px`: the points go as far as they do about the pivot by a turn about that
+    /// place. They go no farther than they were seen to move; an oscillator that chance drives may be fitted so.
+    fn sway_about(&self, base_px: Point2<f64>, film: &Film) -> Sway {
+        let arm_px = self.arm_px(self.pivot_px, film);
+        let fitted_px = self.sway.amplitude_deg.to_radians() * arm_px;
+        let as_seen = (SQRT_2 * self.moved_px(film) / fitted_px).min(1.0);
+        let as_far = arm_px / self.arm_px(base_px, film);
+        Sway {
+            amplitude_deg: self.sway.amplitude_deg * as_seen * as_far,
+            ..self.sway
+        }
+    }
+
+    /// How far its points are from a place, root mean square, px.
+    fn arm_px(&self, from_px: Point2<f64>, film: &Film) -> f64 {
+        let mut squares = Vec::with_capacity(self.tracks.len());
+        for &k in &self.tracks {
+            squares.push((mean_px(&film.tracks[k].at_px) - from_px).norm_squared());
+        }
+        root_mean(&squares)
+    }
+
+    /// How far its points are from their mean places, root mean square over points and frames, px.
+    fn moved_px(&self, film: &Film) -> f64 {
+        let mut squares = Vec::new();
+        for &k in &self.tracks {
+            let at_px = &film.tracks[k].at_px;
+            let middle_px = mean_px(at_px);
+            let seen = at_px.iter().filter(|at| at.x.is_finite());
+            squares.extend(seen.map(|at| (at - middle_px).norm_squared()));
+        }
+        root_mean(&squares)
+    }
+
     fn is_of_carrier(&self, carriers: &[Mode]) -> bool {
         let mut carriers = carriers.iter();
         carriers.any(|c| c.has_frequency_of(&self.mode, self.same_within))
     }
+}
+
+fn root_mean(squares: &[f64]) -> f64 {
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 impl PointModes {
@@ -132,6 +171,16 @@ impl PointModes {
             let mode = self.mode_of(b, &carriers);
             if let Some(mode) = mode.filter(|mode| mode.is_sure) {
                 sways[b] = Ok(mode.sway);
+            }
+        }
+    }
+
+    /// Gives answers that are of these modes their amplitudes about the places where their branches begin.
+    pub fn turn_about_bases(&self, tree: &BranchTree, film: &Film, sways: &mut [Swaying]) {
+        for (branch, sway) in tree.branches.iter().zip(sways) {
+            let Ok(known) = sway else { continue };
+            if let Some(mode) = self.modes.iter().find(|mode| mode.sway == *known) {
+                *known = mode.sway_about(branch.base_px, film);
             }
         }
     }
@@ -228,6 +277,7 @@ impl PointModes {
 
 #[cfg(test)]
 mod tests {
+    use super::super::film::FilmTrack;
     use super::*;
     use crate::model::{Excitation, Interval, Node, Size, Skeleton};
 
@@ -276,9 +326,52 @@ mod tests {
             min_share_of_branch: 0.6,
         };
         let mut sways = vec![Err(Unidentified::NotMeasured), Ok(sway(0.5)), before];
-        found.answer(&BranchTree::of(&skeleton), &mut sways);
+        let tree = BranchTree::of(&skeleton);
+        found.answer(&tree, &mut sways);
         assert_eq!(sways[1], Ok(sway(0.5)), "the trunk's stays");
         sways[2]
+    }
+
+    /// Nine points that swing by a pixel at a distance from a place, px.
+    fn film_about(place_px: [f64; 2], off_px: f64) -> Film {
+        let [u, v] = place_px;
+        let track = FilmTrack {
+            node: NodeId(2),
+            at_px: [-1.0, 0.0, 1.0]
+                .map(|by| Point2::new(u + by, v - off_px))
+                .to_vec(),
+        };
+        Film::new(&[0.0, 0.1, 0.2], vec![track; 9])
+    }
+
+    /// A branch of 130 px was said to swing by 56 degrees: about a place right beside its points.
+    #[test]
+    fn an_amplitude_is_about_the_place_where_the_branch_begins() {
+        let mode = PointMode {
+            mode: mode_of(&sway(1.0)),
+            branch: None,
+            tracks: (0..5).collect(),
+            clearness: 3.0,
+            same_within: 0.05,
+            sway: sway(1.0),
+            is_sure: true,
+            collinearity: 1.0,
+            pivot_px: Point2::new(300.0, 240.0),
+        };
+        let film = film_about([300.0, 240.0], 10.0);
+        let far = mode.sway_about(Point2::new(300.0, 330.0), &film);
+        assert!((far.amplitude_deg - 0.1).abs() < 1e-3, "{far:?}");
+        assert_eq!(far.frequency_hz, mode.sway.frequency_hz);
+        // No farther than the points were seen to move: 1.15 px at 10 px.
+        let wild = PointMode {
+            sway: Sway {
+                amplitude_deg: 60.0,
+                ..mode.sway
+            },
+            ..mode
+        };
+        let seen = wild.sway_about(wild.pivot_px, &film);
+        assert!((seen.amplitude_deg - 6.6).abs() < 0.1, "{seen:?}");
     }
 
     #[test]

@@ -90,6 +90,9 @@ pub fn analyse(
         ..
     } = &usable;
     withdraw_small(&tree, film, members, *trunk, &mut sways, found.as_ref());
+    if let Some(modes) = &found {
+        modes.turn_about_bases(&tree, film, &mut sways);
+    }
     Analysis {
         modes: modes_of_tree(&tree, film, members, *trunk, &sways, found.as_ref()),
         sway: tree.by_node(&sways),

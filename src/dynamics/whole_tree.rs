@@ -104,7 +104,9 @@ fn swings<'a>(
     let mut swings: Vec<Swing> = Vec::new();
     for (b, sway) in sways.iter().enumerate() {
         let Ok(sway) = sway else { continue };
-        let same = found.iter().find(|mode| mode.sway == *sway);
+        let same = found
+            .iter()
+            .find(|mode| mode.sway.frequency_hz == sway.frequency_hz);
         swings.push(Swing {
             sway: *sway,
             tracks: &members[b],

@@ -20,6 +20,9 @@ const CLOSE_SHARE: f64 = 0.008;
 const CLOSE_MOST: f64 = 0.06;
 const NEARLY_ALL: f64 = 0.93;
 
+/// A crown stroke that holds more of a photograph leaves nothing round the crown, from which it is told.
+const LARGEST_CROWN: f64 = 0.95;
+
 /// How a photograph is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotoOptions {
@@ -57,6 +60,8 @@ pub enum DrawnPart {
 pub enum PhotoError {
     #[error("the crown stroke: {0}; draw it in the photograph, round the crown")]
     BadCrown(OutlineError),
+    #[error("the crown stroke is round all of the photograph; draw it round the crown alone")]
+    AllOfPicture,
     #[error("stroke {number}: ({u:.0}, {v:.0}) lies outside the photograph; draw it on the tree")]
     OffPicture { number: usize, u: f64, v: f64 },
     #[error(
@@ -117,9 +122,11 @@ impl PhotoError {
     /// What of the drawing it is about; `None` if that is the photograph.
     pub fn at_fault(&self) -> Option<DrawnPart> {
         match self {
-            Self::BadCrown(_) | Self::EmptyCrown | Self::NoCrown | Self::CrownApart => {
-                Some(DrawnPart::Crown)
-            }
+            Self::BadCrown(_)
+            | Self::AllOfPicture
+            | Self::EmptyCrown
+            | Self::NoCrown
+            | Self::CrownApart => Some(DrawnPart::Crown),
             Self::OffPicture { number, .. } | Self::Apart { number } => {
                 Some(DrawnPart::Branch(*number))
             }
@@ -132,7 +139,7 @@ impl PhotoError {
     pub fn is_of_strokes(&self) -> bool {
         matches!(
             self,
-            Self::BadCrown(_) | Self::OffPicture { .. } | Self::Apart { .. }
+            Self::BadCrown(_) | Self::AllOfPicture | Self::OffPicture { .. } | Self::Apart { .. }
         )
     }
 }
@@ -453,7 +460,12 @@ fn refuse_off_picture(strokes: &[Stroke], size: Size) -> Result<(), PhotoError> 
 }
 
 fn crown(corners_px: &[Point2<f64>], size: Size) -> Result<Outline, PhotoError> {
-    outline::from_polygon(corners_px, size).map_err(PhotoError::BadCrown)
+    let crown = outline::from_polygon(corners_px, size).map_err(PhotoError::BadCrown)?;
+    let inside = crown.mask.iter().filter(|m| **m != 0).count();
+    match inside as f64 > LARGEST_CROWN * size.area() as f64 {
+        true => Err(PhotoError::AllOfPicture),
+        false => Ok(crown),
+    }
 }
 
 pub(super) fn failed(e: impl std::fmt::Display) -> PhotoError {

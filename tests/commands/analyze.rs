@@ -815,6 +815,19 @@ fn damaged_tracks_give_reasons_and_no_numbers() {
     }
 }
 
+/// Half a table was analysed as a whole film, "no gaps".
+#[test]
+fn a_table_of_points_that_was_cut_off_between_rows_is_said_to_be() {
+    let (_dir, dir) = captured("cut");
+    change_points(&dir, |text| {
+        let rows: Vec<&str> = text.lines().collect();
+        rows[..rows.len() / 2].join("\n") + "\n"
+    });
+    let told = told(&[&dir], &[]);
+    let notes = told["captures"][0]["notes"].to_string();
+    assert!(notes.contains("tracks.csv was cut off"), "{notes}");
+}
+
 #[test]
 fn a_tree_of_one_branch_is_a_tree() {
     let (_dir, dir) = captured("pole");

@@ -579,6 +579,10 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
         r#"<svg width="300" height="300"><path d="M150 290 V20"/></svg>"#,
     );
     scene.write(
+        "all.json",
+        &crown("[[0, 0], [479, 0], [479, 359], [0, 359]]"),
+    );
+    scene.write(
         "away.json",
         &crown("[[400, 15], [470, 15], [470, 110], [400, 110]]"),
     );
@@ -630,6 +634,11 @@ fn bad_photographs_and_strokes_get_one_line_and_leave_nothing() {
             "photo.png --crown away.json --branch trunk.json".into(),
             FAILED,
             "away.json: within the crown stroke are neither leaves nor branches",
+        ),
+        (
+            "photo.png --crown all.json --branch trunk.json".into(),
+            BAD_USAGE,
+            "all.json: the crown stroke is round all of the photograph",
         ),
         (
             "photo.png --crown trunk.json --branch crown.json".into(),

@@ -13,8 +13,13 @@ const MOST_HEADER_LINES: usize = 16;
 /// What parts the cells of a line, tried in this order; `None` is white space.
 const SEPARATORS: [Option<char>; 3] = [Some(';'), Some(','), None];
 
-/// Reads three numbers of every line: those in the columns that a line before the first point calls x, y and z, or
-/// else the first three. Semicolons, commas or white space part them, and decimals have points. Other lines that begin
+/// What the columns of a place are called.
+const X: [&str; 3] = ["x", "easting", "east"];
+const Y: [&str; 3] = ["y", "northing", "north"];
+const Z: [&str; 4] = ["z", "height", "elevation", "altitude"];
+
+/// Reads three numbers of every line: those in the columns that a line before the first point calls x, y and z (or
+/// easting, northing and height), or else the first three. Semicolons, commas or white space part them, and decimals have points. Other lines that begin
 /// with `#` or `//` do not count.
 ///
 /// # Errors
@@ -64,6 +69,12 @@ pub(super) fn read(mut input: impl BufRead, points: &mut Points) -> Result<(), I
         }
     }
     Ok(())
+}
+
+/// Whether a cell holds one of these names, with a unit in brackets behind it or not.
+fn is_of(cell: &str, names: &[&str]) -> bool {
+    let name = cell.split(['(', '[']).next().unwrap_or("").trim();
+    names.iter().any(|wanted| name.eq_ignore_ascii_case(wanted))
 }
 
 fn is_comment(line: &str) -> bool {
@@ -122,11 +133,10 @@ impl Columns {
         let is_comment = is_comment(line);
         let line = line.trim_start_matches(['#', '/']);
         SEPARATORS.into_iter().find_map(|separator| {
-            let column = |wanted: &str| {
-                cells(line, separator).position(|name| name.eq_ignore_ascii_case(wanted))
-            };
+            let column =
+                |names: &[&str]| cells(line, separator).position(|cell| is_of(cell, names));
             Some(Self {
-                at: [column("x")?, column("y")?, column("z")?],
+                at: [column(&X)?, column(&Y)?, column(&Z)?],
                 names: Some(Names {
                     line: number,
                     count: cells(line, separator).count(),
