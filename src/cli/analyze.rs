@@ -393,22 +393,25 @@ fn name_by_markers(study: &mut Study, marked: &MarkedTree) {
             marker_of.insert(piece, name);
         }
     }
-    let rename = |limb: &mut String| {
-        if let Some(name) = marker_of.get(limb.as_str()) {
-            limb.clone_from(name);
-        }
-    };
     for mode in &mut study.modes {
         mode.branch = mode.node.and_then(|node| marked.names.get(&node).cloned());
-        mode.energy
-            .iter_mut()
-            .for_each(|part| rename(&mut part.limb));
+        for part in &mut mode.energy {
+            call_as_marker(&mut part.limb, &marker_of);
+        }
     }
     for branch in &mut study.branches {
-        let moves_with = branch.participation.iter_mut();
-        moves_with
-            .filter_map(|p| p.branch.as_mut())
-            .for_each(rename);
+        for part in &mut branch.participation {
+            if let Some(name) = &mut part.branch {
+                call_as_marker(name, &marker_of);
+            }
+        }
+    }
+}
+
+/// Calls a limb as the marker that it has, if any.
+fn call_as_marker(limb: &mut String, marker_of: &BTreeMap<String, &String>) {
+    if let Some(name) = marker_of.get(limb.as_str()) {
+        limb.clone_from(name);
     }
 }
 

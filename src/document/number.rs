@@ -40,12 +40,12 @@ pub(super) fn known(cell: &str, name: &str) -> Result<Option<f64>, String> {
     if cell.is_empty() {
         return Ok(None);
     }
-    let number: f64 = cell.parse().map_err(|_| is_none(cell, name))?;
+    let number: f64 = cell.parse().map_err(|_| no_number(cell, name))?;
     Ok(number.is_finite().then_some(number))
 }
 
 /// What is wrong with a cell that should hold a number.
-pub(super) fn is_none(cell: &str, name: &str) -> String {
+pub(super) fn no_number(cell: &str, name: &str) -> String {
     format!("{name} is {cell:?}, and must be a number")
 }
 

@@ -230,7 +230,7 @@ impl<R: Read, const N: usize> TableReader<R, N> {
             .parse()
             .ok()
             .filter(|x: &f64| x.is_finite() && x.abs() < 1e12);
-        number.ok_or_else(|| self.bad(number::is_none(self.cell(i), name)))
+        number.ok_or_else(|| self.bad(number::no_number(self.cell(i), name)))
     }
 
     /// A place in the picture along one axis, px, that may be unknown, see [`number::known`].

@@ -138,7 +138,19 @@ pub(super) fn mean_px(at_px: &[Point2<f64>]) -> Point2<f64> {
     Point2::from(seen.map(|p| p.coords).sum::<Vector2<f64>>() / n)
 }
 
-fn centred(at_px: &[Point2<f64>]) -> [Vec<f64>; 2] {
+/// From a place to where each of some tracks of a film is in its mean, px.
+pub(super) fn arms_px<'a>(
+    film: &'a Film,
+    tracks: &'a [usize],
+    from_px: Point2<f64>,
+) -> impl Iterator<Item = Vector2<f64>> + 'a {
+    tracks
+        .iter()
+        .map(move |k| mean_px(&film.tracks[*k].at_px) - from_px)
+}
+
+/// Displacement of a point to the right and down from its mean place, px; no number where it was not seen.
+pub(super) fn centred(at_px: &[Point2<f64>]) -> [Vec<f64>; 2] {
     let mean = mean_px(at_px);
     [0, 1].map(|c| {
         at_px

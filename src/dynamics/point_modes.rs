@@ -7,10 +7,10 @@
 use super::branch_tree::BranchTree;
 use super::decay::{Mode, USUAL_DAMPING};
 use super::film::Film;
-use super::members::{count_among, mean_px};
+use super::members::{arms_px, centred, count_among};
 use crate::model::{NodeId, Sway, Swaying, Unidentified};
+use crate::signal::statistics::rms;
 use nalgebra::Point2;
-use std::f64::consts::SQRT_2;
 
 /// A mode is a captured branch's own if it is in so many of its points at least, and if so much of
 /// the points that have it are on that.
@@ -101,12 +101,16 @@ impl PointMode {
             .is_ok_and(|answer| !own.overlaps(&answer.frequency_hz))
     }
 
-    /// The sway of a branch that begins at `base_px`: the points go as far as they do about the pivot by a turn about that
-    /// place. They go no farther than they were seen to move; an oscillator that chance drives may be fitted so.
+    /// The sway of a branch that begins at `base_px`: the points go as far as they do about the pivot by a turn about
+    /// that place. They go no farther than they were seen to move; an oscillator that chance drives may be fitted so.
     fn sway_about(&self, base_px: Point2<f64>, film: &Film) -> Sway {
         let arm_px = self.arm_px(self.pivot_px, film);
         let fitted_px = self.sway.amplitude_deg.to_radians() * arm_px;
-        let as_seen = (SQRT_2 * self.moved_px(film) / fitted_px).min(1.0);
+        // Of both directions together, at its largest.
+        let tracks = self.tracks.iter().map(|k| &film.tracks[*k].at_px);
+        let moves_px = tracks.flat_map(|at_px| centred(at_px)).flatten();
+        let seen_px = 2.0 * rms(moves_px.filter(|px| px.is_finite()));
+        let as_seen = (seen_px / fitted_px).min(1.0);
         let as_far = arm_px / self.arm_px(base_px, film);
         Sway {
             amplitude_deg: self.sway.amplitude_deg * as_seen * as_far,
@@ -116,33 +120,13 @@ impl PointMode {
 
     /// How far its points are from a place, root mean square, px.
     fn arm_px(&self, from_px: Point2<f64>, film: &Film) -> f64 {
-        let mut squares = Vec::with_capacity(self.tracks.len());
-        for &k in &self.tracks {
-            squares.push((mean_px(&film.tracks[k].at_px) - from_px).norm_squared());
-        }
-        root_mean(&squares)
-    }
-
-    /// How far its points are from their mean places, root mean square over points and frames, px.
-    fn moved_px(&self, film: &Film) -> f64 {
-        let mut squares = Vec::new();
-        for &k in &self.tracks {
-            let at_px = &film.tracks[k].at_px;
-            let middle_px = mean_px(at_px);
-            let seen = at_px.iter().filter(|at| at.x.is_finite());
-            squares.extend(seen.map(|at| (at - middle_px).norm_squared()));
-        }
-        root_mean(&squares)
+        rms(arms_px(film, &self.tracks, from_px).map(|arm| arm.norm()))
     }
 
     fn is_of_carrier(&self, carriers: &[Mode]) -> bool {
         let mut carriers = carriers.iter();
         carriers.any(|c| c.has_frequency_of(&self.mode, self.same_within))
     }
-}
-
-fn root_mean(squares: &[f64]) -> f64 {
-    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 impl PointModes {

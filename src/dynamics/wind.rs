@@ -18,7 +18,7 @@ use super::driven_modes::Spectrum;
 use super::driven_oscillators::{Driven, Oscillator, about_highest_hz};
 use super::film::Film;
 use super::gap_free::{GapFree, frames_with};
-use super::members::{Points, mean_px};
+use super::members::{Points, arms_px};
 use super::swing::rank_one_fraction;
 use crate::cancel::CancelToken;
 use crate::model::{Excitation, NodeId, Sway, Swaying, Unidentified};
@@ -369,12 +369,8 @@ impl InWind<'_> {
 
     /// Sum of the squares of the distances of some points from a place.
     fn arms_px2(&self, base_px: Point2<f64>, points: &Points) -> f64 {
-        let mut sum = 0.0;
-        for &k in &points.tracks {
-            let at_px = mean_px(&self.film.tracks[k].at_px);
-            sum += (at_px - base_px).norm_squared();
-        }
-        sum
+        let arms_px = arms_px(self.film, &points.tracks, base_px);
+        arms_px.map(|arm| arm.norm_squared()).sum()
     }
 }
 

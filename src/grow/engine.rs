@@ -30,16 +30,16 @@ const LEAST_GAIN: f64 = 2.0;
 /// An attractor this many times as far from the tree as attractors are from one another gets a limb of its own
 /// (docs/design/photo.md, "Limbs where no branch is seen").
 const FAR_STEPS: f64 = 1.5;
-/// Shares of a branch's length at which such a limb may leave it, as branches do along all but its lowest part; and how many
-/// of these places are tried, the cheapest first: enough to try other branches than the nearest.
+/// Shares of a branch's length at which such a limb may leave it, as branches do along all but its lowest part; and how
+/// many of these places are tried, the cheapest first: enough to try other branches than the nearest.
 const LIMB_SHARES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 const LIMB_ORIGINS: usize = 24;
 /// Depths that are tried for its end, by chance, and how steep it is out of the picture at most, degrees: 20 and 60 are
 /// as good (ibid.).
 const LIMB_DEPTHS: usize = 6;
 const STEEPEST_DEG: f64 = 45.0;
-/// A tip that is seen is thick if its radius is so many times that of the thinnest branch. It goes on for this share of the
-/// way that there is, as leaves are farther out than wood, by so many steps of attractors at most (there are about
+/// A tip that is seen is thick if its radius is so many times that of the thinnest branch. It goes on for this share of
+/// the way that there is, as leaves are farther out than wood, by so many steps of attractors at most (there are about
 /// twenty across a crown), and tapers to this share of its radius.
 const THICK_TIP: f64 = 3.0;
 const EXTENDED: f64 = 0.8;
@@ -95,9 +95,14 @@ pub fn grow_subtrees(
 ) -> Growth {
     let mut engine = Engine::new(tree, library, region);
     let before_px = engine.in_picture.mean_px();
-    if rounds > 0 {
-        engine.extend_thick_tips();
+    if rounds == 0 {
+        return Growth {
+            before_px,
+            after_px: before_px,
+            ..Growth::default()
+        };
     }
+    engine.extend_thick_tips();
     let (mut idle, mut done) = (0, 0);
     while done < rounds && idle < IDLE_ROUNDS {
         let in_space = region.in_space && done % 2 == 1 && !engine.in_space.is_empty();
@@ -105,9 +110,7 @@ pub fn grow_subtrees(
         idle = if has_grown { 0 } else { idle + 1 };
         done += 1;
     }
-    if rounds > 0 {
-        engine.lead_limbs(random);
-    }
+    engine.lead_limbs(random);
     let growth = Growth {
         branches: engine.branches.iter().filter(|b| b.is_grown).count(),
         rounds: done,
@@ -345,8 +348,8 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Leads limbs to the attractors in the picture that are far from the tree, the farthest first. Those that cannot be
-    /// reached stay far.
+    /// Leads limbs to the attractors in the picture that are far from the tree, the farthest first. Those that cannot
+    /// be reached stay far.
     fn lead_limbs(&mut self, random: &mut Generator) {
         let far_px = FAR_STEPS * self.in_picture.step_px;
         for attractor in self.in_picture.beyond(far_px) {

@@ -20,7 +20,7 @@ const CLOSE_SHARE: f64 = 0.008;
 const CLOSE_MOST: f64 = 0.06;
 const NEARLY_ALL: f64 = 0.93;
 
-/// A crown stroke that holds more of a photograph leaves nothing round the crown, from which it is told.
+/// A crown stroke that holds more of a photograph leaves nothing round the crown to compare it with.
 const LARGEST_CROWN: f64 = 0.95;
 
 /// How a photograph is looked at.

@@ -102,8 +102,8 @@ pub struct SeenInPhotograph {
     pub other_leaves: Option<LeafColour>,
 }
 
-/// Where so much of a crown is red it is leaves: of 20 made ones in autumn at least 0.60; of bare crowns before
-/// walls of brick at most 0.38. Green is of the same pixels where they are yellow.
+/// Where so much of a crown is red, or green if it was said to be bare, it is leaves: of 20 made ones in autumn at
+/// least 0.60; of bare crowns before walls of brick at most 0.38. Green is of the same pixels where they are yellow.
 const LEAFY_SHARE: f64 = 0.5;
 const GREEN_SHARE: f64 = 0.25;
 
@@ -462,8 +462,9 @@ struct Carries {
     kept: usize,
 }
 
-/// A piece has no radius if leaves hide it: a stroke through leaves is a branch, and is no measure of its width. Nor has
-/// one of which all that goes on is hidden, for there leaves cover a part of its width; unless none below it is seen.
+/// A piece has no radius if leaves hide it: a stroke through leaves is a branch, and is no measure of its width. Nor
+/// has one of which all that goes on is hidden, for there leaves cover a part of its width; unless none below it is
+/// seen.
 fn hide_radii(branches: &mut BranchGraph, leaves: &[u8], size: Size) {
     let nodes = &mut branches.nodes;
     let mut is_hidden = vec![false; nodes.len()];

@@ -19,8 +19,8 @@ const Y: [&str; 3] = ["y", "northing", "north"];
 const Z: [&str; 4] = ["z", "height", "elevation", "altitude"];
 
 /// Reads three numbers of every line: those in the columns that a line before the first point calls x, y and z (or
-/// easting, northing and height), or else the first three. Semicolons, commas or white space part them, and decimals have points. Other lines that begin
-/// with `#` or `//` do not count.
+/// easting, northing and height), or else the first three. Semicolons, commas or white space part them, and decimals
+/// have points. Other lines that begin with `#` or `//` do not count.
 ///
 /// # Errors
 /// A line is none of a point, or too long, or has other columns than the line of names, or may have decimal commas.
@@ -89,8 +89,11 @@ fn decimal_commas(number: u64, others: &str) -> ImportError {
 
 /// Whether a line is of numbers alone, and has commas and white space: the commas may be those of decimals.
 fn has_commas_within(line: &str) -> bool {
-    let is_of_number = |c: char| c.is_ascii_digit() || "+-.,eE".contains(c) || c.is_whitespace();
-    line.chars().all(is_of_number) && line.contains(',') && line.contains(char::is_whitespace)
+    line.chars().all(is_of_numbers) && line.contains(',') && line.contains(char::is_whitespace)
+}
+
+fn is_of_numbers(c: char) -> bool {
+    c.is_ascii_digit() || "+-.,eE".contains(c) || c.is_whitespace()
 }
 
 /// The cells of a line, without quotes. Where white space parts them, there are no empty ones.
