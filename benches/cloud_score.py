@@ -41,12 +41,8 @@ def true_tubes(truth):
 
 
 def model_tubes(parent, at, radius):
-    """Of nodes: each piece from its parent's radius to its own where it is the thickest that goes on, else of its own."""
-    heir = {}
-    for i, p in enumerate(parent):
-        if p >= 0 and (p not in heir or radius[i] > radius[heir[p]]):
-            heir[p] = i
-    rows = [(at[p], at[i], radius[p] if heir[p] == i and parent[p] >= 0 else radius[i], radius[i], i)
+    """Of the segments of a treefile: each piece is a cylinder of its own radius, as RayCloudTools has it."""
+    rows = [(at[p], at[i], radius[i], radius[i], i)
             for i, p in enumerate(parent) if p >= 0 and np.linalg.norm(at[i] - at[p]) > 1e-9]
     return Tubes(*zip(*rows))
 

@@ -13,7 +13,7 @@ use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cl
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::check_place;
-use crate::import::{CloudFormat, CloudRead, ImportError, Units, cover_px, read_cloud};
+use crate::import::{CloudFormat, CloudRead, ImportError, TALL_M, Units, cover_px, read_cloud};
 use crate::model::PointCloud;
 use crate::outline;
 use crate::pipeline::stand_scanned;
@@ -29,9 +29,6 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-/// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
-/// that.
-const TALL_M: f64 = 60.0;
 /// A place on a tree is no farther off its wood than this, as a share of the tree's size.
 const BESIDE_TREE: f64 = 0.2;
 /// Radii of twigs that may be given, mm.
@@ -482,6 +479,7 @@ mod tests {
             position: Point3::new(3.0, 4.0, z),
             radius: 0.1,
             is_measured: true,
+            is_joint: false,
         };
         let tree = CloudTree {
             nodes: vec![node(None, 1.0), node(Some(0), 11.0)],

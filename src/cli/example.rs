@@ -2,11 +2,11 @@
 
 use super::command_error::CommandError;
 use super::output::eprint_line;
-use crate::config::Config;
+use crate::config::{Config, Wood};
 use crate::document::Document;
 use crate::files::read_bounded;
 use crate::import::{
-    FlatTree, ImportError, StandingModel, cover_px, joined, read_model, read_sketch,
+    FlatTree, ImportError, ModelTree, StandingModel, cover_px, joined, read_model, read_sketch,
 };
 use crate::model::{Outline, Size};
 use crate::outline;
@@ -33,7 +33,12 @@ impl Example {
     pub fn read(path: &Path, settings: Option<&Path>) -> Result<Self, CommandError> {
         if !path.is_file() {
             let note = Document::note(path)?;
-            let config = note.config.layered(settings, |_| {})?;
+            let mut own = note.config;
+            if note.scan.is_some() {
+                // A scan shows all bends of its branches; those of trees like it are not known.
+                own.wood.curl = Wood::default().curl;
+            }
+            let config = own.layered(settings, |_| {})?;
             let document = Document::read(path, config.export.animation_s)?;
             return Ok(Self { document, config });
         }
@@ -56,6 +61,8 @@ impl Example {
 fn modelled(path: &Path, settings: Option<&Path>) -> Result<Document, CommandError> {
     let bytes = read_file(path)?;
     let model = read_model(&bytes, path).map_err(|e| unfit(path, e))?;
+    say_what_is_lost(path, &model.tree);
+    say_guessed_unit(path, &model.tree).map_err(|e| unfit(path, e))?;
     let standing = StandingModel::of(&model.tree).map_err(|e| unfit(path, e))?;
     let config = modelled_defaults(&standing).layered(settings, |_| {})?;
     let region = region(
@@ -70,6 +77,48 @@ fn modelled(path: &Path, settings: Option<&Path>) -> Result<Document, CommandErr
         poses.push(standing.pose(&model.tree, places, frame, time_s));
     }
     Ok(tree.document(&standing.sway(&model.tree), poses)?)
+}
+
+/// Says how high a tree is of which only its height tells the unit.
+fn say_guessed_unit(path: &Path, tree: &ModelTree) -> Result<(), ImportError> {
+    if !tree.unit_is_guessed {
+        return Ok(());
+    }
+    let height = tree.height()?;
+    let said = match tree.metres_per_unit > 0.0 {
+        true => format!(
+            "note: {}: no unit in the file: taken as metres, the tree is {height:.1} m high",
+            path.display()
+        ),
+        false => format!(
+            "note: {}: no unit in the file, and in metres the tree would be {height:.0} m high: its size counts as not \
+             known",
+            path.display()
+        ),
+    };
+    eprint_line(&format!("arborcam: {said}"));
+    Ok(())
+}
+
+/// Says what of a modelled tree does not count.
+pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
+    let bare = tree.bare_frequencies();
+    if bare > 0 {
+        eprint_line(&format!(
+            "arborcam: warning: {}: the frequencies of {bare} pieces are left out, since they have no interval \
+             (frequency_lo_hz, frequency_hi_hz)",
+            path.display()
+        ));
+    }
+    let made_up = tree.made_up();
+    if made_up > 0 {
+        eprint_line(&format!(
+            "arborcam: note: {}: {made_up} of {} pieces were seen by nobody (copies, twigs, grown); from here on they \
+             count as traced",
+            path.display(),
+            tree.nodes.len() - 1
+        ));
+    }
 }
 
 /// The flat tree in a drawing.

@@ -105,6 +105,7 @@ mod tests {
                 position: foot + nalgebra::Vector3::new(lean[0], lean[1], 1.0) * up_m,
                 radius: 0.05,
                 is_measured: true,
+                is_joint: false,
             });
         }
         nodes.push(CloudNode {

@@ -30,6 +30,8 @@ pub struct CloudNode {
     pub radius: f64,
     /// Whether a circle was fitted there.
     pub is_measured: bool,
+    /// Whether a branch ends there though only one other goes on from it.
+    pub is_joint: bool,
 }
 
 /// What was found on the way.
@@ -95,6 +97,7 @@ pub(super) fn assemble(paths: &[Path], cell: f64) -> Vec<CloudNode> {
                     position: carrier.position + way * (bark / way.norm()),
                     radius: own.radius,
                     is_measured: false,
+                    is_joint: false,
                 });
                 parent = Some(nodes.len() - 1);
             }
@@ -107,6 +110,7 @@ pub(super) fn assemble(paths: &[Path], cell: f64) -> Vec<CloudNode> {
                 position: place.at,
                 radius: place.radius,
                 is_measured: place.measured.is_some_and(|m| m.is_circle),
+                is_joint: false,
             });
             parent = Some(nodes.len() - 1);
         }

@@ -6,7 +6,7 @@ use crate::geometry::Cylinder;
 use std::io::Write;
 
 pub const CYLINDERS_HEADER: &str = "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,\
-length,branch,branch_order";
+length,branch,branch_order,made_up";
 
 /// Writes the table. Numbers count from 1, and the parent of what stands on the ground is 0, as
 /// those tools have it. Model axes; `metres_per_px` 0 leaves pixels.
@@ -31,6 +31,7 @@ pub fn cylinders<W: Write>(out: W, rows: &[Cylinder], metres_per_px: f64) -> Res
         }
         table.count(row.branch as u64 + 1);
         table.count(row.order);
+        table.count(u8::from(row.made_up));
         table.end_row()?;
     }
     table.finish()

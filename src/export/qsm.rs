@@ -8,7 +8,7 @@
 use crate::document::{TableWriter, unit};
 use crate::files::WriteError;
 use crate::geometry::Cylinder;
-use crate::model::{BotanicalBranches, NodeId, Skeleton, SwayColumns, Swaying};
+use crate::model::{BotanicalBranches, NodeId, NodeKind, Skeleton, SwayColumns, Swaying};
 use crate::shape::Limb;
 use nalgebra::Point3;
 use std::fmt::Write as _;
@@ -50,6 +50,7 @@ struct Piece {
     reverse_order: u32,
     /// The one in which it goes on.
     extension: Option<usize>,
+    made_up: bool,
     sway: SwayColumns,
     /// The nearest cylinder at or below it that has a frequency: what that carries swings with it.
     nearest: Option<usize>,
@@ -104,6 +105,7 @@ impl Qsm {
                 order: own.order,
                 reverse_order: 1,
                 extension: None,
+                made_up: own.made_up,
                 sway: own_sway,
                 nearest: None,
             });
@@ -179,7 +181,11 @@ impl Qsm {
     /// The file cannot be written.
     pub fn table<W: Write>(&self, out: W) -> Result<W, WriteError> {
         let own_names = SwayColumns::NAMES.join(",");
-        let header = format!("{HEADER},{own_names},nearest_branchID,{}", nearest_names());
+        let header = format!(
+            "{HEADER},{own_names},nearest_branchID,{},{}",
+            nearest_names(),
+            NodeKind::MADE_UP_COLUMN
+        );
         let mut table = TableWriter::new("qsm.csv", &header, out)?;
         let or_minus_one = |of: Option<usize>| of.map_or(-1.0, |n| n as f64);
         for (id, own) in self.pieces.iter().enumerate() {
@@ -214,6 +220,7 @@ impl Qsm {
             for x in self.nearest_sway(own).values() {
                 table.number(x, 5);
             }
+            table.count(u8::from(own.made_up));
             table.end_row()?;
         }
         table.finish()
@@ -226,23 +233,30 @@ impl Qsm {
         let (names, nearest) = (SwayColumns::NAMES.join(","), nearest_names());
         let mut text = format!(
             "# tree file: segments end at x,y,z; parents count from 0; z is up\n\
-             x,y,z,radius,parent_id,{names},{nearest}\n"
+             x,y,z,radius,parent_id,{names},{nearest},{}\n",
+            NodeKind::MADE_UP_COLUMN
         );
         let Some(first) = self.pieces.first() else {
             return text;
         };
-        push_segment(
-            &mut text,
-            &first.start,
-            first.radius,
-            -1,
-            [&SwayColumns::of(None); 2],
-        );
+        let foot = Segment {
+            end: first.start,
+            radius: first.radius,
+            parent: -1,
+            sways: [SwayColumns::of(None); 2],
+            made_up: false,
+        };
+        foot.push(&mut text);
         for own in &self.pieces {
-            let parent = own.parent.map_or(0, |p| p as i64 + 1);
             text.push_str(", ");
-            let sways = [&own.sway, &self.nearest_sway(own)];
-            push_segment(&mut text, &own.end, own.radius, parent, sways);
+            let segment = Segment {
+                end: own.end,
+                radius: own.radius,
+                parent: own.parent.map_or(0, |p| p as i64 + 1),
+                sways: [own.sway, self.nearest_sway(own)],
+                made_up: own.made_up,
+            };
+            segment.push(&mut text);
         }
         text.push('\n');
         text
@@ -299,24 +313,32 @@ fn nearest_names() -> String {
         .join(",")
 }
 
-fn push_segment(
-    text: &mut String,
-    at: &Point3<f64>,
+/// A segment of a treefile.
+struct Segment {
+    end: Point3<f64>,
     radius: f64,
     parent: i64,
-    sways: [&SwayColumns; 2],
-) {
-    // Writing to a string does not fail.
-    let _ = write!(
-        text,
-        "{:.DECIMALS$},{:.DECIMALS$},{:.DECIMALS$},{radius:.DECIMALS$},{parent}",
-        at.x, at.y, at.z
-    );
-    for x in sways.iter().flat_map(|sway| sway.values()) {
-        let _ = match x.is_finite() {
-            true => write!(text, ",{x:.5}"),
-            false => write!(text, ",nan"),
-        };
+    /// Its own, and that of the nearest measured branch.
+    sways: [SwayColumns; 2],
+    made_up: bool,
+}
+
+impl Segment {
+    fn push(&self, text: &mut String) {
+        let (at, radius, parent) = (&self.end, self.radius, self.parent);
+        // Writing to a string does not fail.
+        let _ = write!(
+            text,
+            "{:.DECIMALS$},{:.DECIMALS$},{:.DECIMALS$},{radius:.DECIMALS$},{parent}",
+            at.x, at.y, at.z
+        );
+        for x in self.sways.iter().flat_map(|sway| sway.values()) {
+            let _ = match x.is_finite() {
+                true => write!(text, ",{x:.5}"),
+                false => write!(text, ",nan"),
+            };
+        }
+        let _ = write!(text, ",{}", u8::from(self.made_up));
     }
 }
 

@@ -2,9 +2,13 @@
 //! al. 2013; SimpleTree).
 
 use super::chain::continuations;
-use crate::model::{BotanicalBranches, Skeleton};
-use crate::shape::Limb;
+use crate::model::Skeleton;
+use crate::shape::{CenterlineSample, Limb};
 use nalgebra::Point3;
+
+/// A middle line is straight and tapers evenly where it is off that by less than this share of its length and its
+/// radius.
+const EVEN: f64 = 1e-6;
 
 /// One straight piece of wood.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,12 +26,14 @@ pub struct Cylinder {
     pub order: u32,
     /// The limb that it is a piece of.
     pub limb: usize,
+    /// Nobody has seen it, as [`Limb::made_up`].
+    pub made_up: bool,
 }
 
-/// The limbs as cylinders, parents first; each as thick as its limb is at the middle of the cylinder, and within what
-/// carries it as where it comes out of that. Pieces without length are left out. Branches and orders are those of
-/// [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends where it begins, or
-/// leaves it.
+/// The limbs as cylinders, parents first; each has the volume of what it stands for, and within what carries it is as
+/// thick as where it comes out of that. What is straight and tapers evenly is one cylinder; pieces without length are
+/// left out. Branches and orders are those of [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends
+/// where it begins, or leaves it.
 pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
     let branches = skeleton.botanical_branches();
     let mut goes_on = continuations(limbs);
@@ -41,7 +47,7 @@ pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder>
             goes_on[p] = Some(i);
         }
     }
-    let mut cylinders = pieces(limbs, &goes_on, &branches);
+    let mut cylinders = pieces(limbs, &goes_on, skeleton);
     thin_within_carriers(&mut cylinders);
     cylinders
 }
@@ -60,7 +66,7 @@ fn thin_within_carriers(cylinders: &mut [Cylinder]) {
             let carrier = cylinders[*first]
                 .parent
                 .map_or(0.0, |p| cylinders[p].radius);
-            (own.start - cylinders[*first].start).norm() < carrier
+            (own.end - cylinders[*first].start).norm() < carrier
         }));
     }
     for i in (0..cylinders.len()).rev() {
@@ -72,43 +78,50 @@ fn thin_within_carriers(cylinders: &mut [Cylinder]) {
     }
 }
 
-/// The cylinders of limbs; `goes_on` holds the limb in which each goes on, and `branches` the order of one that is
-/// no twig.
-fn pieces(
-    limbs: &[Limb],
-    goes_on: &[Option<usize>],
-    branches: &BotanicalBranches,
-) -> Vec<Cylinder> {
+/// A branch among the cylinders.
+#[derive(Clone, Copy)]
+struct Numbered {
+    branch: usize,
+    order: u32,
+}
+
+/// The cylinders of limbs; `goes_on` holds the limb in which each goes on.
+fn pieces(limbs: &[Limb], goes_on: &[Option<usize>], skeleton: &Skeleton) -> Vec<Cylinder> {
+    let branches = skeleton.botanical_branches();
     let mut out: Vec<Cylinder> = Vec::new();
-    // The cylinders of every limb, and its branch with its order.
+    // The cylinders of every limb, and its branch.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
-    let mut branch_of: Vec<(usize, u32)> = Vec::with_capacity(limbs.len());
+    let mut branch_of: Vec<Numbered> = Vec::with_capacity(limbs.len());
     let mut n_branches = 0;
     for (i, limb) in limbs.iter().enumerate() {
         let parent = limb.parent.filter(|&p| p < i);
-        let (branch, order) = match parent {
+        let own = match parent {
             Some(p) if goes_on[p] == Some(i) => branch_of[p],
             _ => {
                 n_branches += 1;
                 let order = match parent.filter(|_| limb.twig) {
-                    Some(p) => branch_of[p].1 + 1,
+                    Some(p) => branch_of[p].order + 1,
                     None => branches.order(limb.node),
                 };
-                (n_branches - 1, order)
+                Numbered {
+                    branch: n_branches - 1,
+                    order,
+                }
             }
         };
-        branch_of.push((branch, order));
+        branch_of.push(own);
         let first = out.len();
         let mut before = parent.and_then(|p| nearest(&out, of_limb[p].clone(), limb));
-        for pair in limb.samples.windows(2) {
+        for pair in ends_of_even_pieces(&limb.samples).windows(2) {
             let cylinder = Cylinder {
                 parent: before,
                 start: pair[0].at,
                 end: pair[1].at,
-                radius: 0.5 * (pair[0].radius + pair[1].radius),
-                branch,
-                order,
+                radius: radius_by_volume(pair[0].radius, pair[1].radius),
+                branch: own.branch,
+                order: own.order,
                 limb: i,
+                made_up: limb.made_up,
             };
             if cylinder.is_sound() {
                 before = Some(out.len());
@@ -124,6 +137,35 @@ fn pieces(
         of_limb.push(own);
     }
     out
+}
+
+/// The radius of the cylinder that has the volume of a frustum.
+fn radius_by_volume(from: f64, to: f64) -> f64 {
+    ((from * from + from * to + to * to) / 3.0).sqrt()
+}
+
+/// The first sample, the last, and those at which the middle line turns or tapers otherwise.
+fn ends_of_even_pieces(samples: &[CenterlineSample]) -> Vec<&CenterlineSample> {
+    let mut ends: Vec<&CenterlineSample> = samples.first().into_iter().collect();
+    for pair in samples.windows(2).skip(1) {
+        let from = ends[ends.len() - 1];
+        if !is_even(from, &pair[0], &pair[1]) {
+            ends.push(&pair[0]);
+        }
+    }
+    ends.extend(samples.last().filter(|_| samples.len() > 1));
+    ends
+}
+
+/// Whether `between` lies where an even taper from one sample to the other has it.
+fn is_even(from: &CenterlineSample, between: &CenterlineSample, to: &CenterlineSample) -> bool {
+    let way = to.at - from.at;
+    let share = (between.at - from.at).dot(&way) / way.norm_squared();
+    let off = (between.at - (from.at + way * share)).norm();
+    let radius_off = between.radius - (from.radius + (to.radius - from.radius) * share);
+    (0.0..=1.0).contains(&share)
+        && off <= EVEN * way.norm()
+        && radius_off.abs() <= EVEN * from.radius.max(to.radius)
 }
 
 impl Cylinder {
@@ -163,6 +205,7 @@ mod tests {
             branch,
             order: branch as u32,
             limb: branch,
+            made_up: false,
         };
         let mut table = [
             piece(None, 0, [0.0, 0.0, 0.0], [0.0, 50.0, 0.0], 10.0),
@@ -171,6 +214,6 @@ mod tests {
             piece(Some(2), 1, [12.0, 52.0, 0.0], [30.0, 70.0, 0.0], 4.0),
         ];
         thin_within_carriers(&mut table);
-        assert_eq!(table.map(|c| c.radius), [10.0, 4.0, 4.0, 4.0]);
+        assert_eq!(table.map(|c| c.radius), [10.0, 7.0, 7.0, 4.0]);
     }
 }

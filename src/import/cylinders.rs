@@ -7,7 +7,7 @@ use super::model_tree::{Edges, from_z_up};
 use super::segments::{self, Segment};
 use super::wood_table::{number, separator_of};
 use crate::files::{TableFault, without_byte_order_mark};
-use crate::model::SwayColumns;
+use crate::model::{NodeKind, SwayColumns};
 use csv::StringRecord;
 use nalgebra::Point3;
 
@@ -53,6 +53,7 @@ struct Columns {
     /// `None` where there is no such column.
     radius: Option<usize>,
     sway: [Option<usize>; SwayColumns::NAMES.len()],
+    made_up: Option<usize>,
     is_z_up: bool,
     separator: char,
 }
@@ -105,6 +106,7 @@ impl Columns {
                     places: found.map(Option::unwrap_or_default),
                     radius: place(table.radius),
                     sway: SwayColumns::NAMES.map(place),
+                    made_up: place(NodeKind::MADE_UP_COLUMN),
                     is_z_up: table.is_z_up,
                     separator,
                 });
@@ -141,7 +143,11 @@ impl Columns {
             parent: Some(segments::id(parent)?),
             start: Some(self.place([x, y, z])),
             end: self.place([to_x, to_y, to_z]),
-            wood: segments::wood(self.known(row, self.radius)?, sway),
+            wood: segments::wood(
+                self.known(row, self.radius)?,
+                sway,
+                self.known(row, self.made_up)?,
+            ),
         })
     }
 

@@ -43,7 +43,7 @@ pub use gltf_skeleton::MovingModel;
 pub use join::joined;
 pub use lens_profile::read_lens_profile;
 pub use model_file::{is_wood_table, read_model};
-pub use model_tree::{ModelNode, ModelTree, Wood};
+pub use model_tree::{ModelNode, ModelTree, TALL_M, Wood};
 pub use sketch::{Sketch, Stroke, read_sketch, read_strokes};
 pub use standing::StandingModel;
 pub use traced::traced;

@@ -23,18 +23,23 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(ImportError::bad_format("it is empty"));
     }
+    let mut is_table = false;
     let edges = match ending.to_str().unwrap_or_default() {
         "glb" | "gltf" => return gltf_skeleton::read(bytes, path),
         "obj" => obj::edges(&String::from_utf8_lossy(bytes))?,
         "ply" => ply::edges(bytes)?,
-        ending => match WoodTable::of(&begin_of(bytes)) {
-            Some(WoodTable::Cylinders) => cylinders::edges(bytes)?,
-            Some(WoodTable::Treefile) => treefile::edges(&String::from_utf8_lossy(bytes))?,
-            None => return Err(no_table(bytes, path, ending)),
-        },
+        ending => {
+            is_table = true;
+            match WoodTable::of(&begin_of(bytes)) {
+                Some(WoodTable::Cylinders) => cylinders::edges(bytes)?,
+                Some(WoodTable::Treefile) => treefile::edges(&String::from_utf8_lossy(bytes))?,
+                None => return Err(no_table(bytes, path, ending)),
+            }
+        }
     };
+    let tree = ModelTree::of_edges(&edges)?;
     Ok(MovingModel {
-        tree: ModelTree::of_edges(&edges)?,
+        tree: if is_table { tree.in_metres() } else { tree },
         poses: Vec::new(),
         step_s: 0.0,
     })

@@ -16,6 +16,8 @@ pub struct ModelTree {
     pub nodes: Vec<ModelNode>,
     /// Metres in the unit of the file; 0 where it is not known.
     pub metres_per_unit: f64,
+    /// Whether nothing but the height says that it is in metres, as tables usually are.
+    pub unit_is_guessed: bool,
 }
 
 /// A place of a modelled tree.
@@ -35,6 +37,10 @@ pub struct Wood {
     /// In the unit of the file; 0 where it is not known.
     pub radius: f64,
     pub sway: Option<Sway>,
+    /// The file gives a frequency without its interval, which does not count.
+    pub has_bare_frequency: bool,
+    /// The file says that nobody has seen it: a copy, a twig, or what a generator made up.
+    pub is_made_up: bool,
 }
 
 /// What a file says: places, and which of them are joined.
@@ -53,6 +59,9 @@ pub(super) fn from_z_up([x, y, z]: [f64; 3]) -> Point3<f64> {
     Point3::new(x, z, -y)
 }
 
+/// Trees are seldom higher, m: the highest broad-leaved trees of Europe and North America reach about
+/// that.
+pub const TALL_M: f64 = 60.0;
 /// Forks on one way from the foot: levels are counted in a byte.
 const MOST_LEVELS: usize = 250;
 /// A tree is not so many times as wide as it is high.
@@ -100,6 +109,30 @@ impl ModelTree {
             known.push(own.or_else(|e| below.map_or(Err(e), |p| known[p])));
         }
         known
+    }
+
+    /// For every node whether a branch that sways otherwise goes on in the only one that it carries.
+    pub fn sway_changes(&self) -> Vec<bool> {
+        let known = self.sways();
+        let children = self.children();
+        let mut changes = vec![false; self.nodes.len()];
+        for (i, above) in children.iter().enumerate().skip(1) {
+            if let [only] = above[..] {
+                changes[i] = self.nodes[only].wood.sway.is_some() && known[only] != known[i];
+            }
+        }
+        changes
+    }
+
+    /// Pieces of which the file says that nobody has seen them.
+    pub fn made_up(&self) -> usize {
+        self.nodes.iter().filter(|n| n.wood.is_made_up).count()
+    }
+
+    /// Pieces with a frequency that does not count, since the file gives no interval of it.
+    pub fn bare_frequencies(&self) -> usize {
+        let nodes = self.nodes.iter();
+        nodes.filter(|node| node.wood.has_bare_frequency).count()
     }
 
     /// The tree of joined places, y up. Places that are the same are one. Places that are joined to
@@ -153,7 +186,18 @@ impl ModelTree {
         Ok(Self {
             nodes,
             metres_per_unit: 0.0,
+            unit_is_guessed: false,
         })
+    }
+
+    /// The same in metres, unless it would be too high a tree then.
+    pub(super) fn in_metres(self) -> Self {
+        let is_tree = self.height().is_ok_and(|height| height <= TALL_M);
+        Self {
+            metres_per_unit: if is_tree { 1.0 } else { 0.0 },
+            unit_is_guessed: true,
+            ..self
+        }
     }
 }
 
@@ -181,6 +225,8 @@ impl Edges {
                 known.radius = own.radius;
             }
             known.sway = known.sway.or(own.sway);
+            known.has_bare_frequency |= own.has_bare_frequency;
+            known.is_made_up |= own.is_made_up;
         }
         wood
     }
@@ -198,22 +244,18 @@ fn same_places(places: &[Point3<f64>]) -> Vec<usize> {
     same
 }
 
-/// All that is joined to the foot.
+/// All that is joined to the foot, in the order of the file as far as parents come first.
 fn from_foot(
     foot: usize,
     neighbours: &BTreeMap<usize, Vec<usize>>,
     places: &[Point3<f64>],
 ) -> Result<Vec<ModelNode>, ImportError> {
-    let mut nodes = vec![ModelNode {
-        parent: None,
-        position: places[foot],
-        place: foot,
-        wood: Wood::default(),
-    }];
+    let mut nodes: Vec<ModelNode> = Vec::new();
+    // The places that hang on the nodes so far, each with the node.
+    let mut waiting: BTreeMap<usize, Option<usize>> = BTreeMap::from([(foot, None)]);
     let mut is_known = vec![false; places.len()];
     is_known[foot] = true;
-    let mut next = 0;
-    while let Some(ModelNode { parent, place, .. }) = nodes.get(next).copied() {
+    while let Some((place, parent)) = waiting.pop_first() {
         let below = parent.map(|p| nodes[p].place);
         for end in neighbours.get(&place).into_iter().flatten().copied() {
             if Some(end) == below {
@@ -222,14 +264,14 @@ fn from_foot(
             if std::mem::replace(&mut is_known[end], true) {
                 return Err(ImportError::Cyclic);
             }
-            nodes.push(ModelNode {
-                parent: Some(next),
-                position: places[end],
-                place: end,
-                wood: Wood::default(),
-            });
+            waiting.insert(end, Some(nodes.len()));
         }
-        next += 1;
+        nodes.push(ModelNode {
+            parent,
+            position: places[place],
+            place,
+            wood: Wood::default(),
+        });
     }
     Ok(nodes)
 }

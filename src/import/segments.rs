@@ -40,16 +40,21 @@ pub(super) fn id(cell: f64) -> Option<i64> {
     (cell.fract() == 0.0 && cell.abs() < LARGEST_ID).then_some(cell as i64)
 }
 
-/// What a table says of a piece: its radius, and its sway by the columns of [`SwayColumns`]. Tables do
-/// not say what made it sway, and it counts as wind. What is not known is no number, or nothing above 0.
-pub(super) fn wood(radius: f64, sway: [f64; 6]) -> Wood {
+/// What a table says of a piece: its radius, its sway by the columns of [`SwayColumns`], and whether nobody has seen
+/// it (1). Tables do not say what made it sway, and it counts as wind. What is not known is no number, or nothing
+/// above 0.
+pub(super) fn wood(radius: f64, sway: [f64; 6], made_up: f64) -> Wood {
+    let columns = SwayColumns::of_values(sway);
+    let sway = columns.sway(Excitation::Wind, f64::NAN);
     Wood {
         radius: if radius.is_finite() {
             radius.max(0.0)
         } else {
             0.0
         },
-        sway: SwayColumns::of_values(sway).sway(Excitation::Wind, f64::NAN),
+        sway,
+        has_bare_frequency: sway.is_none() && columns.frequency_hz > 0.0,
+        is_made_up: made_up > 0.0,
     }
 }
 
@@ -109,6 +114,7 @@ fn joined(segments: &[Segment], parents: &[Option<usize>]) -> Edges {
             file.places.push(start);
             file.wood.push(Wood {
                 sway: None,
+                has_bare_frequency: false,
                 ..own.wood
             });
             file.places.len() - 1
@@ -156,7 +162,7 @@ mod tests {
             parent,
             start: Some(Point3::origin()),
             end: end.into(),
-            wood: wood(0.1 * id as f64, [f64::NAN; 6]),
+            wood: wood(0.1 * id as f64, [f64::NAN; 6], f64::NAN),
         }
     }
 

@@ -8,7 +8,7 @@ use super::segments::{self, Segment};
 use super::sketch::refuse_more;
 use super::wood_table;
 use crate::files::without_byte_order_mark;
-use crate::model::SwayColumns;
+use crate::model::{NodeKind, SwayColumns};
 
 /// What a header says on a line: how many numbers there are of the tree and of each segment, and
 /// where in a segment its place, its parent and what else is known of it are.
@@ -20,6 +20,7 @@ struct Columns {
     /// `None` where there is no such column.
     radius: Option<usize>,
     sway: [Option<usize>; SwayColumns::NAMES.len()],
+    made_up: Option<usize>,
     separator: char,
 }
 
@@ -81,6 +82,7 @@ impl Columns {
             parent: column("parent_id")?,
             radius: column("radius"),
             sway: SwayColumns::NAMES.map(column),
+            made_up: column(NodeKind::MADE_UP_COLUMN),
             separator,
         })
     }
@@ -105,6 +107,7 @@ impl Columns {
                 wood: segments::wood(
                     known(row, self.radius),
                     self.sway.map(|column| known(row, column)),
+                    known(row, self.made_up),
                 ),
             });
         }

@@ -44,6 +44,8 @@ impl NodeKind {
     pub const ALL: [Self; 4] = [Self::Measured, Self::Shoot, Self::Grown, Self::Traced];
     /// What files say of a node that repeats another one, in place of that one's kind.
     pub const COPY: &str = "copy";
+    /// The column of tables of wood that says whether nobody has seen it: 1 or 0.
+    pub const MADE_UP_COLUMN: &str = "made_up";
 
     /// One word for files.
     pub fn word(self) -> &'static str {

@@ -50,7 +50,8 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
     }
 }
 
-/// A modelled tree as one of a scan, node by node; a unit of its file is so many metres.
+/// A modelled tree as one of a scan, node by node; a unit of its file is so many metres. The radius of a piece is
+/// that of its middle, and that of a node the mean of what ends and what goes on there.
 ///
 /// # Errors
 /// A radius is not known, it has no height or is far wider than high, or too many forks on one way.
@@ -60,18 +61,21 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
         ..CloudFigures::default()
     };
     model.refuse_deep()?;
+    if model.nodes.iter().skip(1).any(|n| n.wood.radius <= 0.0) {
+        return Err(ImportError::NoRadius);
+    }
+    let radii = end_radii(model);
+    let sway_changes = model.sway_changes();
     let mut nodes = Vec::with_capacity(model.nodes.len());
-    for node in &model.nodes {
+    for (i, node) in model.nodes.iter().enumerate() {
         let at = node.position * metres_per_unit;
         nodes.push(CloudNode {
             parent: node.parent,
             position: Point3::new(at.x, -at.z, at.y),
-            radius: node.wood.radius * metres_per_unit,
+            radius: radii[i] * metres_per_unit,
             is_measured: false,
+            is_joint: sway_changes[i],
         });
-    }
-    if nodes.iter().skip(1).any(|n| n.radius <= 0.0) {
-        return Err(ImportError::NoRadius);
     }
     // The foot is as thick as what stands on it.
     let above_m = nodes.get(1).map_or(0.0, |n| n.radius);
@@ -79,11 +83,32 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
     Ok(CloudTree { nodes, figures })
 }
 
-/// For each node the one in which its branch ends: the next fork or tip. The foot is its own.
+/// The radius where each piece ends: the mean of its own and that of the thickest that goes on there.
+fn end_radii(model: &ModelTree) -> Vec<f64> {
+    let mut above = vec![0.0; model.nodes.len()];
+    for node in &model.nodes {
+        if let Some(parent) = node.parent {
+            above[parent] = f64::max(above[parent], node.wood.radius);
+        }
+    }
+    let mut radii = Vec::with_capacity(model.nodes.len());
+    for (node, above) in model.nodes.iter().zip(above) {
+        let own = node.wood.radius;
+        radii.push(if above > 0.0 {
+            0.5 * (own + above)
+        } else {
+            own
+        });
+    }
+    radii
+}
+
+/// For each node the one in which its branch ends: the next fork, joint or tip. The foot is its own.
 fn movers(tree: &CloudTree, children: &[usize]) -> Vec<usize> {
     let mut movers: Vec<usize> = (0..tree.nodes.len()).collect();
     for i in (1..tree.nodes.len()).rev() {
-        if let Some(parent) = tree.nodes[i].parent.filter(|p| *p > 0 && children[*p] == 1) {
+        let goes_on = |p: &usize| *p > 0 && children[*p] == 1 && !tree.nodes[*p].is_joint;
+        if let Some(parent) = tree.nodes[i].parent.filter(goes_on) {
             movers[parent] = movers[i];
         }
     }
@@ -111,6 +136,7 @@ mod tests {
             position: at.into(),
             radius: 0.1,
             is_measured: true,
+            is_joint: false,
         };
         let tree = CloudTree {
             nodes: places.map(node).to_vec(),
@@ -139,7 +165,7 @@ mod tests {
             place: 0,
             wood: Wood {
                 radius: 0.1,
-                sway: None,
+                ..Wood::default()
             },
         }
     }
@@ -157,6 +183,7 @@ mod tests {
         ModelTree {
             nodes,
             metres_per_unit: 0.0,
+            unit_is_guessed: false,
         }
     }
 

@@ -7,6 +7,7 @@ use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
 use arborcam::model::{NodeId, NodeKind};
 use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::BufReader;
@@ -174,8 +175,14 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
 }
 
 /// Rows of a table: a stem of `from` to `to` that tapers from `thick` m, in 40 pieces that are numbered from
-/// `first` and grow on `parent`; the last says how it sways.
-fn stem_rows(first: usize, parent: usize, ends: [[f64; 3]; 2], thick: f64, sway: &str) -> String {
+/// `first` and grow on `parent`; behind each stands the first of `told`, behind the last the other.
+fn stem_rows(
+    first: usize,
+    parent: usize,
+    ends: [[f64; 3]; 2],
+    thick: f64,
+    told: [&str; 2],
+) -> String {
     const PIECES: usize = 40;
     let [from, to] = ends.map(Point3::from);
     let place = |k: usize| from + (to - from) * (k as f64 / PIECES as f64);
@@ -184,7 +191,7 @@ fn stem_rows(first: usize, parent: usize, ends: [[f64; 3]; 2], thick: f64, sway:
         let below = if k == 0 { parent } else { first + k - 1 };
         let [a, b] = [place(k), place(k + 1)];
         let radius = thick * (1.0 - 0.95 * (k as f64 + 0.5) / PIECES as f64);
-        let told = if k + 1 == PIECES { sway } else { ",,,,," };
+        let told = told[usize::from(k + 1 == PIECES)];
         let id = first + k;
         writeln!(
             rows,
@@ -206,9 +213,15 @@ fn a_table_of_cylinders_is_a_tree_as_that_of_a_scan() {
                     frequency_hi_hz,damping_ratio,damping_lo,damping_hi\n"
             .to_owned();
     let sway = "0.8,0.78,0.82,0.05,0.04,0.06";
-    rows += &stem_rows(1, 0, [[7.0, 3.0, 1.0], [7.0, 3.0, 6.0]], 0.2, ",,,,,");
+    rows += &stem_rows(1, 0, [[7.0, 3.0, 1.0], [7.0, 3.0, 6.0]], 0.2, [",,,,,"; 2]);
     // From the end of the 20th piece, which is half way up.
-    rows += &stem_rows(41, 20, [[7.0, 3.0, 3.5], [8.5, 3.0, 5.0]], 0.08, sway);
+    rows += &stem_rows(
+        41,
+        20,
+        [[7.0, 3.0, 3.5], [8.5, 3.0, 5.0]],
+        0.08,
+        [",,,,,", sway],
+    );
     fs::write(&table, &rows).expect("table");
     let [out, again] = ["oak", "again.csv"].map(|name| dir.path().join(name));
     let said = done(&["cloud", table.to_str().expect("name")], &out);
@@ -268,6 +281,62 @@ fn a_table_of_cylinders_is_a_tree_as_that_of_a_scan() {
     let said = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(FAILED), "{said}");
     assert!(said.contains("pieces of it have no radius"), "{said}");
+}
+
+/// A row gives a cylinder again that ends where it ends, also where one branch goes on in another that sways
+/// otherwise.
+#[test]
+fn a_table_comes_back_row_by_row() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let path = dir.path().join("oak.csv");
+    let header = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius,made_up,frequency_hz,frequency_lo_hz,\
+                  frequency_hi_hz,damping_ratio,damping_lo,damping_hi\n";
+    let mut rows = header.to_owned();
+    let [stem, top, side] = ["0,0.5,0.49,0.51,,,", "0,0.8,0.78,0.82,,,", "1,,,,,,"];
+    rows += &stem_rows(1, 0, [[7.0, 3.0, 1.0], [7.0, 3.0, 4.0]], 0.2, [stem; 2]);
+    rows += &stem_rows(41, 40, [[7.0, 3.0, 4.0], [7.2, 3.0, 5.0]], 0.1, [top; 2]);
+    // From the end of the 20th piece. Its frequency has no interval.
+    let last = "1,1.2,,,,,";
+    rows += &stem_rows(
+        81,
+        20,
+        [[7.0, 3.0, 2.5], [8.5, 3.0, 4.0]],
+        0.08,
+        [side, last],
+    );
+    fs::write(&path, &rows).expect("table");
+    let [tree, again] = ["oak", "again.csv"].map(|name| dir.path().join(name));
+    let said = done(&["cloud", path.to_str().expect("name")], &tree);
+    assert!(
+        said.contains("frequencies of 1 pieces are left out"),
+        "{said}"
+    );
+    assert!(
+        said.contains("40 of 120 pieces were seen by nobody"),
+        "{said}"
+    );
+    done(
+        &["export", tree.to_str().expect("name"), "--format", "qsm"],
+        &again,
+    );
+    let [before, after] = [&path, &again].map(|path| records(path));
+    assert_eq!(before.len(), after.len());
+    for (a, b) in before.iter().zip(&after) {
+        for name in ["endX", "endY", "endZ"] {
+            let [a, b] = [a, b].map(|row| row[name].parse::<f64>().expect("number"));
+            assert!((a - b).abs() < 1e-3, "{name}: {a}, {b}");
+        }
+        let has_interval = !a["frequency_lo_hz"].is_empty();
+        let wanted = if has_interval { &a["frequency_hz"] } else { "" };
+        assert_eq!(b["frequency_hz"], wanted);
+        assert_eq!(b["made_up"], "0");
+    }
+}
+
+/// The rows of a table by the names of its columns.
+fn records(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut table = csv::Reader::from_path(path).expect("table");
+    table.deserialize().map(|row| row.expect("row")).collect()
 }
 
 #[test]

@@ -234,7 +234,7 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     assert_eq!(
         lines.next(),
         Some(
-            "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,length,branch,branch_order"
+            "ID,parentID,start_x,start_y,start_z,end_x,end_y,end_z,axis_x,axis_y,axis_z,radius,length,branch,branch_order,made_up"
         )
     );
     let rows: Vec<Vec<f64>> = lines
@@ -243,7 +243,7 @@ fn csv_is_the_tables_and_cylinders_that_join() {
     assert!(rows.len() > 70, "{} cylinders", rows.len());
     let mut order: BTreeMap<u64, f64> = BTreeMap::new();
     for (k, row) in rows.iter().enumerate() {
-        assert_eq!((row.len(), row[0]), (15, k as f64 + 1.0));
+        assert_eq!((row.len(), row[0]), (16, k as f64 + 1.0));
         let way: Vec<f64> = (0..3).map(|c| row[5 + c] - row[2 + c]).collect();
         let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
         assert!(

@@ -2,7 +2,7 @@
 
 use super::{CloudArgs, Scan, Unit};
 use crate::cli::command_error::CommandError;
-use crate::cli::example::{read_file, unfit};
+use crate::cli::example::{read_file, say_what_is_lost, unfit};
 use crate::cli::output::eprint_line;
 use crate::cli::stop::Stop;
 use crate::cli::unused;
@@ -33,6 +33,7 @@ pub fn read(path: &Path) -> Result<Option<ModelTree>, CommandError> {
         return Ok(None);
     }
     let model = read_model(&read_file(path)?, path).map_err(|e| unfit(path, e))?;
+    say_what_is_lost(path, &model.tree);
     Ok(Some(model.tree))
 }
 
