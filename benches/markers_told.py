@@ -11,7 +11,8 @@ One row a film:
   other     share of the places that are more than a marker's width from the true one: they are on another thing
   board     px between the true place and the hidden marker's in the two seconds after the board, median
   first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
-and at the end for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
+of a film with depth also the angle in space of each branch to what carries it (`analyze --angles`), against that of the true places: root mean
+square of their difference in degrees, and as a share of the true sway; and at the end for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
 held against that true branch between the marker and its parent whose frequency is nearest. One with no true branch between is wrong.
 """
 import argparse, csv, json, subprocess, tempfile
@@ -81,8 +82,74 @@ def row(args, film, out):
     true_hz = trunk["freq_hz"] * np.sqrt(1 - trunk["damping"] ** 2)
     print(f"{film.name:<12}{len(matched):>5}/{len(truth['markers']):<3}{np.median(errors):>8.2f}{np.quantile(errors, 0.95):>7.2f}"
           f"{errors.max():>7.1f}{100 * other.mean():>7.1f}%{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
+    for line in angles_in_space(args.arborcam, film, out, truth["markers"]):
+        print("  " + line, flush=True)
     return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz=true_hz,
                 answers=answers(film, branches))
+
+
+def angles_in_space(arborcam, film, capture, markers):
+    """A line for each marker of a film with depth."""
+    if "places_m" not in markers[0]:
+        return
+    camera = json.loads((film / "truth.json").read_text())["camera"]
+    x, y = camera["centre_xy"]
+    foot = np.array([-x, y, camera["distance"]]) * camera["real_metres"]
+    by_name = {m["name"]: m for m in markers}
+    with tempfile.TemporaryDirectory() as work:
+        table = Path(work) / "angles.csv"
+        subprocess.run([arborcam, "analyze", capture, f"--markers={film / 'markers.json'}", "--angles", table], check=True, capture_output=True)
+        rows = list(csv.DictReader(open(table)))
+    for marker in markers:
+        own = [r for r in rows if r["branch"] == marker["name"] and r["angle_in_space_deg"]]
+        if not own:
+            yield f"{marker['name']}: no angle"
+            continue
+        frames = np.array([round(30 * float(r["time_s"])) for r in own])
+        true = true_angle(marker, by_name, foot)[np.clip(frames, 0, len(marker["places_m"]) - 1)]
+        told = np.array([float(r["angle_in_space_deg"]) for r in own])
+        true, told = true - true.mean(), told - told.mean()
+        off = min((told - true).std(), (told + true).std())
+        yield f"{marker['name']}: {len(own)} angles, true sway {true.std():.2f} deg rms, off by {off:.2f} deg rms ({100 * off / true.std():.0f} %)"
+
+
+def true_angle(marker, by_name, foot):
+    """How far a branch has turned from where its carrier takes it, degrees, along the direction in which it sways most."""
+    own = np.array(marker["places_m"])
+    parent = by_name.get(marker["parent"])
+    base = np.broadcast_to(foot, own.shape) if parent is None else np.array(parent["places_m"])
+    way = own - base
+    rest = unit(way.mean(0))
+    if parent is not None:
+        below = by_name.get(parent["parent"])
+        carrier = base - (foot if below is None else np.array(below["places_m"]))
+        way = np.array([turning(c, carrier.mean(0)) @ w for c, w in zip(carrier, way)])
+    turns = np.array([turn(rest, w) for w in way])
+    turns -= turns.mean(0)
+    axis = np.linalg.svd(turns, full_matrices=False)[2][0]
+    return np.degrees(turns @ axis)
+
+
+def unit(v):
+    return v / np.linalg.norm(v)
+
+
+def turn(a, b):
+    """The rotation vector from one direction to another."""
+    axis = np.cross(unit(a), unit(b))
+    size = np.linalg.norm(axis)
+    return axis * (np.arcsin(min(size, 1)) / size if size > 1e-12 else 1)
+
+
+def turning(a, b):
+    """The least rotation from one direction to another."""
+    v = turn(a, b)
+    angle = np.linalg.norm(v)
+    if angle < 1e-12:
+        return np.eye(3)
+    x, y, z = v / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
 def places(capture):

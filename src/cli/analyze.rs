@@ -14,18 +14,20 @@ use crate::dynamics::{Depth, Film, Take, analyse};
 use crate::export::picture::data_address;
 use crate::files::check_place;
 use crate::model::{Excitation, FilmCut, Lens, NodeName, Pose, Skeleton, Swaying, TreeMode};
-use crate::report::{Comparison, Given, Study, compare, csv, hints, json, page, text};
+use crate::report::{
+    Comparison, Given, Study, angles_csv, compare, csv, hints, json, page, spectra_csv, text,
+};
 use crate::tui::columns;
 use crate::views::{SwayFound, update};
 use anyhow::anyhow;
 use nalgebra::Point2;
 pub use options::AnalyzeArgs;
-use options::LensProfile;
+use options::{Content, FileAsked, LensProfile};
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use written::{with_amplitudes, write_report};
+use written::{with_amplitudes, write_file};
 
 /// Longest part of a film that is analysed if one is chosen, s; of a longer part the end is used.
 /// Points of hours would fill the memory.
@@ -50,8 +52,8 @@ struct Found {
 
 pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
     args.check()?;
-    if let Some(path) = &args.report {
-        check_place(path)?;
+    for file in args.files() {
+        check_place(file.path)?;
     }
     let stop = Stop::on_signals()?;
     let names = names(&args.dirs);
@@ -79,9 +81,9 @@ pub fn run(args: &AnalyzeArgs) -> Result<(), CommandError> {
             failures.extend(update(dir, found, stop).err().map(CommandError::from));
         }
     }
-    if let Some(path) = &args.report {
-        let html = page(&studies, comparison.as_ref());
-        failures.extend(report(path, html, stop).err());
+    for file in args.files() {
+        let written = write_asked(file, &studies, comparison.as_ref(), stop);
+        failures.extend(written.err());
     }
     combined(failures)
 }
@@ -137,10 +139,21 @@ fn table(
     Ok(text(studies, comparison, columns().map(usize::from)))
 }
 
-/// Writes the report, and prints where.
-fn report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), CommandError> {
-    write_report(path, html, stop)?;
-    eprint_line(&format!("report:  {}", path.display()));
+/// Writes a file that is asked for, and prints where.
+fn write_asked(
+    file: FileAsked,
+    studies: &[Study],
+    comparison: Option<&Comparison>,
+    stop: &AtomicBool,
+) -> Result<(), CommandError> {
+    let bytes = match file.content {
+        Content::Report => page(studies, comparison).into_bytes(),
+        Content::Angles => angles_csv(studies)?,
+        Content::Spectra => spectra_csv(studies)?,
+    };
+    write_file(file.path, bytes, stop)?;
+    let what = format!("{}:", file.content.word());
+    eprint_line(&format!("{what:<9}{}", file.path.display()));
     Ok(())
 }
 
@@ -240,7 +253,7 @@ fn analyse_capture(
             poses
         }
     };
-    let picture = document.picture.as_ref().filter(|_| args.report.is_some());
+    let picture = document.picture.as_ref().filter(|_| args.wants_report());
     let picture = picture.and_then(|p| data_address(&p.rgb).ok());
     let outline = document.note.outline.iter();
     let outline_px: Vec<Point2<i32>> = outline

@@ -56,8 +56,7 @@ impl AngleToParent {
             direction_in_picture(pose, from, to)
         });
         let own = direction_in_picture(pose, begin, end);
-        let shortest = base.x.hypot(base.y).min(own.x.hypot(own.y));
-        if !shortest.is_finite() || shortest < SHORTEST_PX {
+        if !has_direction(&base) || !has_direction(&own) {
             return f64::NAN;
         }
         let angle = base.perp(&own).atan2(base.dot(&own)).to_degrees();
@@ -104,6 +103,12 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
         .collect()
 }
 
+/// Whether a way in the picture leads anywhere; one to a place that is not known does not.
+fn has_direction(way: &Vector2<f64>) -> bool {
+    let length = way.norm();
+    length.is_finite() && length >= SHORTEST_PX
+}
+
 fn direction_in_picture(pose: &Pose, from: NodeId, to: NodeId) -> Vector2<f64> {
     let [from, to] = [from, to].map(|n| pose.joints[n.index()].position);
     (to - from).xy()
@@ -125,9 +130,11 @@ fn carried_direction(
 
 /// The rotation between two directions as a vector along its axis.
 fn turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Vector3<f64>> {
-    UnitQuaternion::rotation_between(from, to)
-        .map(|q| q.scaled_axis())
-        .filter(|v| v.iter().all(|x| x.is_finite()))
+    // Of a place that is not known it would be the rotation that turns nothing.
+    if !to.iter().all(|x| x.is_finite()) {
+        return None;
+    }
+    UnitQuaternion::rotation_between(from, to).map(|q| q.scaled_axis())
 }
 
 /// The nearest branch at or below the one that ends in `node` that has a direction in the picture.
@@ -225,6 +232,20 @@ mod tests {
         );
         assert!(plane.iter().all(|a| a.abs() < 1e-6), "{plane:?}");
         assert!(angle_in_space_deg(&tree, &[pose(&rest[..2])], NodeId(2))[0].is_nan());
+    }
+
+    /// One frame without a place once took the angle of all later ones.
+    #[test]
+    fn a_place_that_is_not_known_takes_the_angle_of_its_frame_only() {
+        let rest = [[0.0; 3], [0.0, 10.0, 0.0], [-1.0, 20.0, 1.0]];
+        let nowhere = [rest[0], rest[1], [f64::NAN; 3]];
+        let turned = [rest[0], rest[1], [1.0, 20.0, 1.0]];
+        let poses = [pose(&rest), pose(&nowhere), pose(&turned)];
+        for angle_deg in [angle_to_parent_deg, angle_in_space_deg] {
+            let angles = angle_deg(&chain(&rest), &poses, NodeId(2));
+            assert!(angles[1].is_nan(), "{angles:?}");
+            assert!((angles[0] - angles[2]).abs() > 10.0, "{angles:?}");
+        }
     }
 
     #[test]

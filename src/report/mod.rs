@@ -14,6 +14,7 @@ mod pattern;
 mod pieces;
 mod plot;
 mod released;
+mod series;
 mod study;
 #[cfg(test)]
 mod tests;
@@ -29,6 +30,7 @@ pub use levels::{Growth, Level, Spread, growth, levels};
 pub use matching::{Landmark, Match, Matched, MatchedBy, View, matched};
 pub use pattern::{CommonPeak, LevelPeaks, NoCommonPeak, Pattern, pattern};
 pub use released::hints;
+pub use series::{angles_csv, spectra_csv};
 pub use study::{Branch, Gap, Given, Study};
 pub use text::text;
 pub use tidy::csv;

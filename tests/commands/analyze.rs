@@ -674,6 +674,50 @@ fn well_formed(html: &str) {
     assert!(open.is_empty(), "{open:?}");
 }
 
+/// A row for each branch and frame; the largest amplitude of a branch's spectrum is at its peak in the table.
+#[test]
+fn angles_and_their_spectra_are_written_as_tables() {
+    let (_dir, dir) = captured("tables");
+    let [angles, spectra] = ["new/angles.csv", "new/spectra.csv"].map(|name| {
+        let path = dir.with_file_name(name);
+        path.display().to_string()
+    });
+    let told = told(&[&dir], &["--angles", &angles, "--spectra", &spectra]);
+    let capture = &told["captures"][0];
+    let frames = capture["frames"].as_u64().expect("frames");
+    let branches = capture["branches"].as_array().expect("branches");
+    let rows = rows_of(&angles);
+    assert_eq!(rows.len() as u64, frames * branches.len() as u64);
+    let known = rows.iter().filter(|row| !row["angle_deg"].is_empty());
+    assert!(known.count() > rows.len() / 2);
+    let mut largest: BTreeMap<String, (f64, f64)> = BTreeMap::new();
+    for row in rows_of(&spectra) {
+        let [hz, deg] =
+            ["frequency_hz", "amplitude_deg"].map(|name| row[name].parse().expect("number"));
+        let peak = largest.entry(row["node_id"].clone()).or_insert((hz, deg));
+        if deg > peak.1 && hz > 0.3 {
+            *peak = (hz, deg);
+        }
+    }
+    let mut with_peak = 0;
+    for branch in branches {
+        let Some(peak_hz) = branch["spectrum_peak_hz"].as_f64().filter(|hz| *hz > 0.3) else {
+            continue;
+        };
+        let (hz, _) = largest[&branch["node_id"].to_string()];
+        assert!((hz - peak_hz).abs() < 0.05, "{hz}, not {peak_hz}");
+        with_peak += 1;
+    }
+    assert!(with_peak > 0);
+    let again = analyze(&[&dir], &["--angles", &angles]);
+    assert_eq!(again.status.code(), Some(FAILED), "it was overwritten");
+}
+
+fn rows_of(path: &str) -> Vec<BTreeMap<String, String>> {
+    let mut table = csv::Reader::from_path(path).expect("table");
+    table.deserialize().map(|row| row.expect("row")).collect()
+}
+
 #[test]
 fn the_report_is_one_file_that_needs_nothing_else_and_tells_all() {
     let (_dir, first) = captured("<b>&\"calm");

@@ -11,7 +11,7 @@ use crate::model::Lens;
 use anyhow::anyhow;
 use clap::{Args, ValueEnum};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 #[derive(Debug, Args)]
@@ -29,7 +29,13 @@ pub struct AnalyzeArgs {
     pub csv: bool,
     /// Also write a page with plots (HTML, in one file); the file must not exist.
     #[arg(long, value_name = "FILE")]
-    pub report: Option<PathBuf>,
+    report: Option<PathBuf>,
+    /// Also write the angles of all branches over time (CSV); the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    angles: Option<PathBuf>,
+    /// Also write the spectra of these angles (CSV); the file must not exist.
+    #[arg(long, value_name = "FILE")]
+    spectra: Option<PathBuf>,
     /// Write the results to the captures, to nodes.csv and tree.glb, and judge them anew in
     /// capture.json. Without it nothing is written to a capture.
     #[arg(long)]
@@ -100,6 +106,32 @@ fn readout(text: &str) -> Result<f64, String> {
     )
 }
 
+/// What is written to a file of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    Report,
+    Angles,
+    Spectra,
+}
+
+impl Content {
+    /// Its option, and what is said of it.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Report => "report",
+            Self::Angles => "angles",
+            Self::Spectra => "spectra",
+        }
+    }
+}
+
+/// A file that is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct FileAsked<'a> {
+    pub content: Content,
+    pub path: &'a Path,
+}
+
 /// Markers with their parents, from a file.
 #[derive(Clone, Debug)]
 struct MarkerParents(Vec<MarkerWindow>);
@@ -135,7 +167,7 @@ impl AnalyzeArgs {
     ///
     /// # Errors
     /// A folder is given twice, unless its rows are wanted twice; the film would end before it
-    /// begins; the report has no name.
+    /// begins; a file that is to be written has no name.
     pub fn check(&self) -> Result<(), CommandError> {
         let mut seen = BTreeSet::new();
         for dir in &self.dirs {
@@ -153,13 +185,36 @@ impl AnalyzeArgs {
                 within_s.lo, within_s.hi
             ));
         }
-        match &self.report {
-            Some(path) if path.file_name().is_none() => bad_usage(format!(
-                "--report {} is no name for a file; choose another",
-                path.display()
-            )),
-            _ => Ok(()),
+        for file in self.files() {
+            if file.path.file_name().is_none() {
+                return bad_usage(format!(
+                    "--{} {} is no name for a file; choose another",
+                    file.content.word(),
+                    file.path.display()
+                ));
+            }
         }
+        Ok(())
+    }
+
+    /// The files that are to be written beside the table.
+    pub fn files(&self) -> impl Iterator<Item = FileAsked<'_>> {
+        let asked = [
+            (Content::Report, &self.report),
+            (Content::Angles, &self.angles),
+            (Content::Spectra, &self.spectra),
+        ];
+        asked.into_iter().filter_map(|(content, path)| {
+            Some(FileAsked {
+                content,
+                path: path.as_deref()?,
+            })
+        })
+    }
+
+    /// Whether the page with plots is to be written.
+    pub fn wants_report(&self) -> bool {
+        self.report.is_some()
     }
 
     /// Whether markers are analysed in place of branches.

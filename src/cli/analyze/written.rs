@@ -19,16 +19,16 @@ pub fn with_amplitudes(skeleton: &Skeleton, analysed: Vec<Swaying>, study: &Stud
     sway
 }
 
-/// Writes the report to a new file.
+/// Writes a new file.
 ///
 /// # Errors
 /// It cannot be written, or writing was stopped; no file is left then.
-pub fn write_report(path: &Path, html: String, stop: &AtomicBool) -> Result<(), WriteError> {
+pub fn write_file(path: &Path, bytes: Vec<u8>, stop: &AtomicBool) -> Result<(), WriteError> {
     let name = path
         .file_name()
         .unwrap_or_default()
         .to_string_lossy()
         .into_owned();
     let folder = path.parent().unwrap_or(Path::new(""));
-    write_files(folder, &[(name, html.into_bytes())], stop)
+    write_files(folder, &[(name, bytes)], stop)
 }
