@@ -7,7 +7,7 @@
 demo: setup build
 	@scripts/demo.sh
 
-# ONLY=views, film, shapes, wind, grown, sketch, photo, cloud, markers, forest, points, terminal, page or sheets for one group. CLIPS is ARBORCAM_CLIPS if not given.
+# ONLY=views, film, shapes, wind, grown, sketch, photo, cloud, markers, hu, forest, points, terminal, page or sheets for one group. CLIPS is ARBORCAM_CLIPS if not given.
 pictures: build
 	@CLIPS="$(CLIPS)" ONLY="$(ONLY)" scripts/pictures.sh
 
@@ -63,8 +63,10 @@ BINARY ?= target/release/arborcam
 put = install -D -m
 with_prefix = sed 's|@PREFIX@|$(PREFIX)|g'
 DOCS = README.md docs/using.md docs/camera.md docs/recordings.md docs/files.md docs/settings.md docs/service.md docs/outline.md docs/method.md docs/dynamics.md docs/sweep.md docs/viewer.md docs/gallery.md docs/animate.md docs/analyze.md docs/grow.md docs/forest.md docs/sketch.md docs/photo.md docs/markers.md docs/depth.md docs/clouds.md
+LENSES = $(addprefix config/lenses/, LICENSE README.md apple-iphone-11.json arducam-imx477-6mm.json google-pixel-4a.json raspberry-pi-camera-3.json raspberry-pi-hq-3.2mm.json)
 INSTALLED = $(PREFIX)/bin/arborcam $(PREFIX)/lib/arborcam/arborcam-service \
 	$(addprefix $(PREFIX)/share/arborcam/, arborcam.toml sbc.toml) \
+	$(addprefix $(PREFIX)/share/arborcam/, $(LENSES:config/%=%)) \
 	$(addprefix $(PREFIX)/share/doc/arborcam/, $(notdir $(DOCS))) \
 	$(SYSTEM)/systemd/system/arborcam@.service $(SYSTEM)/udev/rules.d/70-arborcam.rules \
 	$(SYSTEM)/sysusers.d/arborcam.conf $(SYSTEM)/tmpfiles.d/arborcam.conf
@@ -83,11 +85,13 @@ install:
 	$(put) 644 systemd/arborcam.tmpfiles $(DESTDIR)$(SYSTEM)/tmpfiles.d/arborcam.conf
 	install -d $(DESTDIR)$(PREFIX)/share/arborcam $(DESTDIR)$(PREFIX)/share/doc/arborcam
 	install -m 644 config/arborcam.toml config/sbc.toml $(DESTDIR)$(PREFIX)/share/arborcam
+	install -d $(DESTDIR)$(PREFIX)/share/arborcam/lenses
+	install -m 644 $(LENSES) $(DESTDIR)$(PREFIX)/share/arborcam/lenses
 	install -m 644 $(DOCS) $(DESTDIR)$(PREFIX)/share/doc/arborcam
 	@test -n "$(DESTDIR)" || scripts/activate.sh
 
 # Captures and /etc/arborcam are the user's and stay.
 uninstall:
 	rm -f $(addprefix $(DESTDIR), $(INSTALLED))
-	-rmdir $(addprefix $(DESTDIR)$(PREFIX)/, lib/arborcam share/arborcam share/doc/arborcam) 2>/dev/null
+	-rmdir $(addprefix $(DESTDIR)$(PREFIX)/, lib/arborcam share/arborcam/lenses share/arborcam share/doc/arborcam) 2>/dev/null
 	@test -n "$(DESTDIR)" || scripts/activate.sh

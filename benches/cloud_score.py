@@ -7,6 +7,7 @@ NEAR_M = 0.03  # a place of the model is of the true branch whose bark is no far
 RUN_M = 0.08  # the branch below is the first that the model follows for so long, below the lowest place of a branch
 FOUND_SHARE = 0.5  # of a branch, for it to be found
 ON_SURFACE_M = 0.01
+NEAR_CLOUD_M = 0.02  # the model's bark is on the cloud if a point is no farther
 
 
 class Tubes:
@@ -41,7 +42,8 @@ def true_tubes(truth):
 
 
 def model_tubes(parent, at, radius):
-    """Of the segments of a treefile: each piece is a cylinder of its own radius, as RayCloudTools has it."""
+    """Of the segments of a treefile, each with its parent's index, where it ends (m) and its radius (m): cylinders, as RayCloudTools has
+    them. The true tubes taper."""
     rows = [(at[p], at[i], radius[i], radius[i], i)
             for i, p in enumerate(parent) if p >= 0 and np.linalg.norm(at[i] - at[p]) > 1e-9]
     return Tubes(*zip(*rows))
@@ -51,9 +53,11 @@ def score(truth, points, parent, at, radius):
     true, model = true_tubes(truth), model_tubes(parent, at, radius)
     tree_points = points[true.off(points)[0] < NEAR_M]
     on_surface = np.abs(model.off(tree_points)[0]) <= ON_SURFACE_M
+    to_cloud, _ = cKDTree(tree_points).query(model.at)
+    near = np.abs(to_cloud - model.radius) <= NEAR_CLOUD_M
     right, found = topology(truth, true, model, parent, at)
     return dict(length=model.length / true.length - 1, volume=model.volume / true.volume - 1,
-                parents=float(np.mean(right)), found=float(np.mean(found)), surface=float(np.mean(on_surface)),
+                parents=float(np.mean(right)), found=float(np.mean(found)), surface=float(np.mean(on_surface)), near=float(np.mean(near)),
                 branches=len(right), nodes=len(parent))
 
 

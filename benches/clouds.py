@@ -8,6 +8,7 @@ For each seed: a cloud by made_clouds.py, `arborcam cloud` and `arborcam export 
   length, volume   of all wood, against the truth, minus 1
   parents          share of branches that grow from the right one; one that is not found counts as wrong
   surface          share of the tree's points no farther than 1 cm from the surface of the model
+  near             share of the model's length whose bark has a point of the cloud within 2 cm
   points, s, MB    points of the cloud, time on the processor and largest memory of `arborcam cloud`
 
 With --trees N (2 or more) a cloud is a plot of N trees. Each found tree is taken for the true one that most of its points are of, and gets

@@ -11,8 +11,9 @@ One row a film:
   other     share of the places that are more than a marker's width from the true one: they are on another thing
   board     px between the true place and the hidden marker's in the two seconds after the board, median
   first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
-of a film with depth also the angle in space of each branch to what carries it (`analyze --angles`), against that of the true places: root mean
-square of their difference in degrees, and as a share of the true sway; and at the end for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
+A film with depth has a line more for each branch, on its angle in space to what carries it (`analyze --angles`) against that of the true places:
+standard deviation of their difference in degrees, and as a share of that of the true angle. Both are turned to the side on which they agree better,
+and means are taken off. At the end, for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
 held against that true branch between the marker and its parent whose frequency is nearest. One with no true branch between is wrong.
 """
 import argparse, csv, json, subprocess, tempfile
@@ -24,6 +25,7 @@ import numpy as np
 RIGHT_WITHIN = 0.02
 FIRST_ID = 1_000_000_000
 END_S = 2.0
+FPS = 30
 
 
 def main():
@@ -55,8 +57,8 @@ def row(args, film, out):
     truth = json.loads((film / "truth_markers.json").read_text())
     spec = "auto" if args.auto else str(film / "markers.json")
     video = film / "video.mkv"
-    source = [video] if video.exists() else [film, "--no-depth"]
-    subprocess.run([args.arborcam, "replay", *source, "--outline", film / "outline.json", "--markers", spec, "--fast",
+    source = video if video.exists() else film
+    subprocess.run([args.arborcam, "replay", source, "--outline", film / "outline.json", "--markers", spec, "--fast",
                     "--headless", "--out", out], check=True, capture_output=True)
     seen = places(out)
     matched = match(truth["markers"], seen)
@@ -105,12 +107,14 @@ def angles_in_space(arborcam, film, capture, markers):
         if not own:
             yield f"{marker['name']}: no angle"
             continue
-        frames = np.array([round(30 * float(r["time_s"])) for r in own])
-        true = true_angle(marker, by_name, foot)[np.clip(frames, 0, len(marker["places_m"]) - 1)]
-        told = np.array([float(r["angle_in_space_deg"]) for r in own])
-        true, told = true - true.mean(), told - told.mean()
-        off = min((told - true).std(), (told + true).std())
-        yield f"{marker['name']}: {len(own)} angles, true sway {true.std():.2f} deg rms, off by {off:.2f} deg rms ({100 * off / true.std():.0f} %)"
+        frames = np.array([round(FPS * float(r["time_s"])) for r in own])
+        angles = true_angle(marker, by_name, foot)
+        inside = frames < len(angles)
+        true = angles[frames[inside]]
+        measured = np.array([float(r["angle_in_space_deg"]) for r in own])[inside]
+        off = min((measured - true).std(), (measured + true).std())
+        sway = max(true.std(), 1e-9)
+        yield f"{marker['name']}: {len(true)} angles, true sway {sway:.2f} deg, off by {off:.2f} deg ({100 * off / sway:.0f} %)"
 
 
 def true_angle(marker, by_name, foot):
@@ -138,7 +142,7 @@ def turn(a, b):
     """The rotation vector from one direction to another."""
     axis = np.cross(unit(a), unit(b))
     size = np.linalg.norm(axis)
-    return axis * (np.arcsin(min(size, 1)) / size if size > 1e-12 else 1)
+    return axis * (np.arctan2(size, unit(a) @ unit(b)) / size if size > 1e-12 else 1)
 
 
 def turning(a, b):

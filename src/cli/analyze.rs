@@ -209,6 +209,17 @@ fn analyse_capture(
     if let Some(unsure) = marked.as_ref().and_then(unsure_parents) {
         notes.add("note", unsure);
     }
+    if args
+        .marker_parents()
+        .is_some_and(|given| given.iter().all(|m| m.parent.is_none()))
+    {
+        notes.add(
+            "note",
+            "no marker of the file has a parent, and all begin at the foot; with --markers alone parents follow from the \
+             motion"
+                .to_owned(),
+        );
+    }
     let camera = Optics::of(args, document)?;
     if let Some(undone) = camera.note(args) {
         notes.add("note", undone);
@@ -281,7 +292,7 @@ fn analyse_capture(
         notes: &notes.all,
     });
     if let Some(marked) = &marked {
-        name_by_markers(&mut study, marked);
+        name_by_markers(&mut study, marked, !document.note.config.markers.find);
     }
     Ok(CaptureAnalysis {
         found: Found {
@@ -396,12 +407,13 @@ fn unsure_parents(marked: &MarkedTree) -> Option<String> {
 }
 
 /// Calls the branches as the markers are called in which they end, and so in the modes; a limb of several as the first
-/// of them.
-fn name_by_markers(study: &mut Study, marked: &MarkedTree) {
+/// of them. Markers that were found without the user have names by chance, which are no evidence across captures.
+fn name_by_markers(study: &mut Study, marked: &MarkedTree, are_given: bool) {
     study.by_markers = true;
     let mut marker_of: BTreeMap<String, &String> = BTreeMap::new();
     for branch in &mut study.branches {
         if let Some(name) = marked.names.get(&NodeName(branch.name)) {
+            branch.marker = are_given.then(|| name.clone());
             let piece = std::mem::replace(&mut branch.piece, name.clone());
             marker_of.insert(piece, name);
         }

@@ -14,7 +14,7 @@ use crate::config::Config;
 use crate::document::Document;
 use crate::files::check_place;
 use crate::import::{CloudFormat, CloudRead, ImportError, TALL_M, Units, cover_px, read_cloud};
-use crate::model::PointCloud;
+use crate::model::{PointCloud, Verdict};
 use crate::outline;
 use crate::pipeline::stand_scanned;
 use crate::views::{
@@ -179,8 +179,11 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     let drawn = scan.drawn(&tree).map_err(|e| args.failed(e))?;
     let is_stopped = stop.while_writing();
     let branches = drawn.skeleton.botanical_branches().all.len();
+    let mut judged = Some(verdict(&tree.figures));
     match &film {
-        Some(capture) => args.write_with_film(capture, &tree, &scan, drawn, is_stopped)?,
+        Some(capture) => {
+            judged = args.write_with_film(capture, &tree, &scan, drawn, is_stopped)?;
+        }
         None => drawn.write(&args.out, is_stopped)?,
     }
     if !holds_ground {
@@ -189,7 +192,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         );
     }
     scan.say_unit("the tree", tree.figures.height_m);
-    print_summary(&args.out, &tree, branches);
+    print_summary(&args.out, &tree, branches, &judged.unwrap_or_default());
     Ok(())
 }
 
@@ -289,7 +292,8 @@ impl CloudArgs {
         )))
     }
 
-    /// Writes the tree with the frequencies of a film, and says how well that lies on it.
+    /// Writes the tree with the frequencies of a film, and says how well that lies on it. Returns the verdict with
+    /// that.
     ///
     /// # Errors
     /// It does not lie on the scan, or the tree cannot be written.
@@ -300,7 +304,7 @@ impl CloudArgs {
         scan: &Scan,
         mut drawn: DrawnTree,
         is_stopped: &AtomicBool,
-    ) -> Result<(), CommandError> {
+    ) -> Result<Option<Verdict>, CommandError> {
         let film = self.laid_on(capture, tree, scan, &drawn)?;
         let swaying = film.branches();
         let pieces = drawn.skeleton.measured_branches().count();
@@ -308,12 +312,16 @@ impl CloudArgs {
             eprint_line(&format!("arborcam: warning: {warning}"));
             drawn.note.warnings.push(warning);
         }
+        if let Some(finding) = film.finding() {
+            drawn.note.verdict = drawn.note.verdict.map(|verdict| verdict.with(finding));
+        }
+        let verdict = drawn.note.verdict.clone();
         drawn.write_with_film(&self.out, &film, is_stopped)?;
         eprint_line(&format!(
             "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
             lies_on(&film.fit)
         ));
-        Ok(())
+        Ok(verdict)
     }
 
     /// The film on the scan.
@@ -449,7 +457,7 @@ fn print_left_out(not_finite: usize) {
     }
 }
 
-fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
+fn print_summary(out: &Path, tree: &CloudTree, branches: usize, verdict: &Verdict) {
     let figures = tree.figures;
     let leaves = match figures.leaves {
         0 => String::new(),
@@ -464,7 +472,7 @@ fn print_summary(out: &Path, tree: &CloudTree, branches: usize) {
         figures.percent(figures.ground),
         figures.percent(figures.noise),
     ));
-    eprint_line(&verdict(&figures).labelled_line());
+    eprint_line(&verdict.labelled_line());
 }
 
 #[cfg(test)]

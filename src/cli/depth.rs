@@ -4,6 +4,7 @@ use super::command_error::CommandError;
 use super::common::parse_within;
 use super::unused;
 use crate::config;
+use crate::files::{LARGEST_NOTE, read_bounded};
 use crate::import::read_lens_profile;
 use crate::model::{Distortion, Pinhole, Size};
 use crate::source::{CameraFile, SourceInfo};
@@ -49,7 +50,7 @@ fn camera(text: &str) -> Result<CameraFile, String> {
 
 /// The camera of a lens profile, as `calibrate` writes it; `None` where the file is none, or of a fisheye.
 fn of_profile(path: &Path) -> Option<CameraFile> {
-    let lens = read_lens_profile(&std::fs::read(path).ok()?).ok()?;
+    let lens = read_lens_profile(&read_bounded(path, LARGEST_NOTE).ok()?).ok()?;
     let Distortion::RadialTangential(distortion) = lens.distortion else {
         return None;
     };

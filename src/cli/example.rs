@@ -102,21 +102,27 @@ fn say_guessed_unit(path: &Path, tree: &ModelTree) -> Result<(), ImportError> {
 
 /// Says what of a modelled tree does not count.
 pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
-    let bare = tree.bare_frequencies();
+    let bare = tree.without_interval();
     if bare > 0 {
         eprint_line(&format!(
-            "arborcam: warning: {}: the frequencies of {bare} pieces are left out, since they have no interval \
-             (frequency_lo_hz, frequency_hi_hz)",
+            "arborcam: warning: {}: the frequencies of {bare} pieces are left out: they are not above 0, or not within an \
+             interval (frequency_lo_hz, frequency_hi_hz)",
+            path.display()
+        ));
+    }
+    let (thin, all) = (tree.without_radius(), tree.nodes.len() - 1);
+    if thin > 0 && thin < all {
+        eprint_line(&format!(
+            "arborcam: warning: {}: {thin} of {all} pieces have no radius above 0, and no radius of it counts",
             path.display()
         ));
     }
     let made_up = tree.made_up();
     if made_up > 0 {
         eprint_line(&format!(
-            "arborcam: note: {}: {made_up} of {} pieces were seen by nobody (copies, twigs, grown); from here on they \
-             count as traced",
-            path.display(),
-            tree.nodes.len() - 1
+            "arborcam: note: {}: nobody has seen {made_up} of {all} pieces (copies, twigs, grown); the new tree does not \
+             keep that mark",
+            path.display()
         ));
     }
 }

@@ -3,11 +3,13 @@
 use super::command_error::CommandError;
 use super::common::parse_within;
 use crate::config::{Config, MarkerCorrection, MarkerWindow, Markers};
+use crate::files::{LARGEST_NOTE, read_bounded};
 use crate::markers::check_places;
 use crate::model::Size;
 use anyhow::anyhow;
 use clap::Args;
 use serde::Deserialize;
+use std::path::Path;
 
 /// Smallest and largest plausible side of a tag, m.
 const LEAST_TAG_M: f64 = 0.005;
@@ -118,7 +120,8 @@ impl MarkerFile {
     /// # Errors
     /// It cannot be read, is of another form, or names no marker.
     pub fn read(path: &str) -> Result<Self, String> {
-        let bytes = std::fs::read(path).map_err(|e| format!("{e}; give a file, or auto"))?;
+        let bytes = read_bounded(Path::new(path), LARGEST_NOTE)
+            .map_err(|e| format!("{e}; give a file, or auto"))?;
         Self::of_json(&bytes)
     }
 

@@ -382,7 +382,7 @@ fn warnings_of(tree: &TreeInPhoto) -> Vec<String> {
         let colour = colour.name();
         let sought = match tree.is_said_bare {
             true => "not looked for",
-            false => "looked for as green",
+            false => "looked for in another colour",
         };
         warnings.push(format!(
             "half of the crown is {colour}, and leaves were {sought}: if these are leaves, give --foliage {colour}"

@@ -14,8 +14,9 @@ const PICTURES_FPS: f64 = 30.0;
 
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
-    /// A recording (.mcap), a video file (.mkv .avi .mp4) or a folder of pictures (.png .jpg .bmp,
-    /// in name order).
+    /// A recording (.mcap), a ROS 1 recording with depth (.bag), a video file (.mkv .avi .mp4; of an Azure
+    /// Kinect with its depth) or a folder: of pictures (.png .jpg .bmp, in name order), or with depth (rgb.txt,
+    /// depth.txt).
     input: PathBuf,
     /// Process the frames as fast as the machine can, without dropping any. Without it the
     /// recording's own pace is kept.

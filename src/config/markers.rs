@@ -60,9 +60,7 @@ pub(super) fn check(
         ));
     }
     windows.iter().try_for_each(check_window)?;
-    for window in windows {
-        check_parents(window, windows)?;
-    }
+    check_marker_parents(windows)?;
     if corrections.len() > MAX_CORRECTIONS {
         return Err(refused(format!(
             "more than {MAX_CORRECTIONS} corrections are given"
@@ -95,6 +93,17 @@ fn check_window(window: &MarkerWindow) -> Result<(), ConfigError> {
          window_px is [left, top, width, height]",
         window.name
     )))
+}
+
+/// Checks that the parents of markers are markers, and lead to the foot.
+///
+/// # Errors
+/// One is none, or they form a ring.
+pub fn check_marker_parents(windows: &[MarkerWindow]) -> Result<(), ConfigError> {
+    for window in windows {
+        check_parents(window, windows)?;
+    }
+    Ok(())
 }
 
 /// Follows the parents of a marker to the foot.

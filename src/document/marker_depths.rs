@@ -7,6 +7,16 @@ use crate::signal::statistics::median;
 use nalgebra::Point2;
 use std::collections::BTreeMap;
 
+/// A depth that is off the line through so many before and after it by so many standard deviations, as their median
+/// deviation tells them, is that of something else (Hampel's identifier, with its usual numbers).
+const BESIDE: usize = 3;
+const LEAST_ABOUT: usize = 5;
+const DEVIATIONS: f64 = 3.0;
+/// Standard deviation of a normal distribution by its median absolute deviation.
+const SD_BY_MEDIAN: f64 = 1.4826;
+/// The same at least, as a share of the depth: depth cameras are off by some mm at 2 m.
+const LEAST_SD: f64 = 0.003;
+
 /// Depths of markers over time, by the node that each is. Without a depth camera all are in the picture's
 /// plane.
 #[derive(Clone, Debug)]
@@ -57,9 +67,11 @@ impl MarkerDepths {
         }
     }
 
-    /// Adds the marker that is `node`, as it was `seen` in order of time.
+    /// Adds the marker that is `node`, as it was `seen` in order of time. A twig before it or a pixel beside it makes a
+    /// depth jump for single frames; such depths count as not seen.
     pub fn add(&mut self, node: NodeId, seen: Vec<DepthAt>) {
         if self.foot.is_some() {
+            let seen = without_jumps(&seen);
             let depths_m = seen.iter().map(|at| at.depth_m).collect();
             if let Some(rest_m) = median(depths_m, f64::total_cmp) {
                 self.of_node.insert(node, DepthWay { rest_m, seen });
@@ -107,9 +119,63 @@ impl MarkerDepths {
     }
 }
 
+/// The depths without those that are off all about them.
+fn without_jumps(seen: &[DepthAt]) -> Vec<DepthAt> {
+    let mut kept = Vec::with_capacity(seen.len());
+    for (k, own) in seen.iter().enumerate() {
+        let about = &seen[k.saturating_sub(BESIDE)..seen.len().min(k + BESIDE + 1)];
+        if about.len() < LEAST_ABOUT || !is_jump(own, about) {
+            kept.push(*own);
+        }
+    }
+    kept
+}
+
+/// Whether a depth is off the line through those about it by more than they are (Theil and Sen's slope, Hampel's
+/// identifier).
+fn is_jump(own: &DepthAt, about: &[DepthAt]) -> bool {
+    let mut slopes = Vec::new();
+    for (k, a) in about.iter().enumerate() {
+        let later = about[k + 1..].iter();
+        slopes.extend(later.map(|b| (b.depth_m - a.depth_m) / (b.time_s - a.time_s)));
+    }
+    let slope = median(slopes, f64::total_cmp).unwrap_or_default();
+    let from_own_m: Vec<f64> = about
+        .iter()
+        .map(|at| at.depth_m - own.depth_m - slope * (at.time_s - own.time_s))
+        .collect();
+    let off_m = median(from_own_m.clone(), f64::total_cmp).unwrap_or_default();
+    let spread_m = from_own_m.iter().map(|from_m| (from_m - off_m).abs());
+    let sd_m = SD_BY_MEDIAN * median(spread_m.collect(), f64::total_cmp).unwrap_or_default();
+    off_m.abs() > DEVIATIONS * sd_m.max(LEAST_SD * own.depth_m)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A marker that swings by 0.1 m in 30 frames, noise of some mm, and three frames of a twig before it.
+    #[test]
+    fn depths_of_something_before_the_marker_are_left_out() {
+        let mut depths_m: Vec<f64> = (0..120)
+            .map(|k| {
+                let swing = 0.05 * (f64::from(k) * std::f64::consts::TAU / 30.0).sin();
+                2.0 + swing + 0.004 * f64::from(k * 7 % 5 - 2) / 2.0
+            })
+            .collect();
+        for k in [40, 42, 60] {
+            depths_m[k] -= 0.4;
+        }
+        let kept: Vec<f64> = without_jumps(&seen(&depths_m))
+            .iter()
+            .map(|at| at.time_s)
+            .collect();
+        for k in [40.0, 42.0, 60.0] {
+            assert!(!kept.contains(&k), "{kept:?}");
+        }
+        assert!(kept.len() >= 112, "{}", kept.len());
+        assert!(without_jumps(&[]).is_empty());
+    }
 
     const MARKER: NodeId = NodeId(1);
 

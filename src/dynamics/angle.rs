@@ -56,7 +56,7 @@ impl AngleToParent {
             direction_in_picture(pose, from, to)
         });
         let own = direction_in_picture(pose, begin, end);
-        if !has_direction(&base) || !has_direction(&own) {
+        if !is_direction(base.norm()) || !is_direction(own.norm()) {
             return f64::NAN;
         }
         let angle = base.perp(&own).atan2(base.dot(&own)).to_degrees();
@@ -71,7 +71,7 @@ impl AngleToParent {
 /// The same angle in space: how far the branch has turned from where its carrier would have taken
 /// it, degrees, signed along the direction in which it sways most. Unlike the arc cosine of Hu et
 /// al. eq. 1 it tells the two sides of a branch that goes on straight. NaN for poses of another
-/// skeleton.
+/// skeleton and those in which the branch or its carrier has no direction.
 pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> Vec<f64> {
     let end = skeleton.mover(node);
     let Some(begin) = skeleton.begin(end) else {
@@ -103,10 +103,9 @@ pub fn angle_in_space_deg(skeleton: &Skeleton, poses: &[Pose], node: NodeId) -> 
         .collect()
 }
 
-/// Whether a way in the picture leads anywhere; one to a place that is not known does not.
-fn has_direction(way: &Vector2<f64>) -> bool {
-    let length = way.norm();
-    length.is_finite() && length >= SHORTEST_PX
+/// Whether a way of this length leads anywhere; one to a place that is not known does not.
+fn is_direction(length_px: f64) -> bool {
+    length_px.is_finite() && length_px >= SHORTEST_PX
 }
 
 fn direction_in_picture(pose: &Pose, from: NodeId, to: NodeId) -> Vector2<f64> {
@@ -130,8 +129,8 @@ fn carried_direction(
 
 /// The rotation between two directions as a vector along its axis.
 fn turn(from: &Vector3<f64>, to: &Vector3<f64>) -> Option<Vector3<f64>> {
-    // Of a place that is not known it would be the rotation that turns nothing.
-    if !to.iter().all(|x| x.is_finite()) {
+    // Of what has no direction it would be the rotation that turns nothing.
+    if !is_direction(from.norm()) || !is_direction(to.norm()) {
         return None;
     }
     UnitQuaternion::rotation_between(from, to).map(|q| q.scaled_axis())
@@ -142,7 +141,7 @@ fn carrier(skeleton: &Skeleton, node: NodeId) -> Option<(NodeId, NodeId)> {
     let (mut end, nodes) = (node, &skeleton.nodes);
     while let (Some(begin), Some(parent)) = (skeleton.begin(end), skeleton.moving_parent(end)) {
         let way = nodes[end.index()].position - nodes[begin.index()].position;
-        if way.x.hypot(way.y) > SHORTEST_PX {
+        if is_direction(way.x.hypot(way.y)) {
             return Some((begin, end));
         }
         end = parent;

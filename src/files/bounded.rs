@@ -4,6 +4,9 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
+/// No file that a user writes by hand has more bytes: markers, the profile of a lens, the places of pairs.
+pub const LARGEST_NOTE: u64 = 16_000_000;
+
 /// The bytes of a file that may have `most` of them.
 ///
 /// # Errors

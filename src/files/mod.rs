@@ -11,7 +11,7 @@ mod replace;
 mod table_fault;
 mod text;
 
-pub use bounded::read_bounded;
+pub use bounded::{LARGEST_NOTE, read_bounded};
 pub use error::WriteError;
 pub use file::{OutputFile, write_files};
 pub use folder::{OutputFolder, write_folder};

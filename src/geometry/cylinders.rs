@@ -2,12 +2,12 @@
 //! al. 2013; SimpleTree).
 
 use super::chain::continuations;
-use crate::model::Skeleton;
+use crate::model::{BotanicalBranches, Skeleton};
 use crate::shape::{CenterlineSample, Limb};
 use nalgebra::Point3;
 
-/// A middle line is straight and tapers evenly where it is off that by less than this share of its length and its
-/// radius.
+/// A middle line is straight where it is off the straight line by less than this share of that, and tapers evenly where
+/// its radius is off by less than this share of the thicker end: more than sums are rounded by, less than tables show.
 const EVEN: f64 = 1e-6;
 
 /// One straight piece of wood.
@@ -30,8 +30,8 @@ pub struct Cylinder {
     pub made_up: bool,
 }
 
-/// The limbs as cylinders, parents first; each has the volume of what it stands for, and within what carries it is as
-/// thick as where it comes out of that. What is straight and tapers evenly is one cylinder; pieces without length are
+/// The limbs as cylinders, parents first; each has the volume of what it stands for. One that lies wholly within what
+/// carries it is only as thick as the next. What is straight and tapers evenly is one cylinder; pieces without length are
 /// left out. Branches and orders are those of [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends
 /// where it begins, or leaves it.
 pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
@@ -47,14 +47,14 @@ pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder>
             goes_on[p] = Some(i);
         }
     }
-    let mut cylinders = pieces(limbs, &goes_on, skeleton);
+    let mut cylinders = pieces(limbs, &goes_on, &branches);
     thin_within_carriers(&mut cylinders);
     cylinders
 }
 
 /// A branch begins within what carries it, and is no thicker there than where it comes out.
 fn thin_within_carriers(cylinders: &mut [Cylinder]) {
-    // The first cylinder of the branch of each that lies within the carrier.
+    // The first cylinder of the branch of each, as long as all so far lie wholly within the carrier.
     let mut begin: Vec<Option<usize>> = Vec::with_capacity(cylinders.len());
     for (i, own) in cylinders.iter().enumerate() {
         let first = match own.parent {
@@ -86,8 +86,11 @@ struct Numbered {
 }
 
 /// The cylinders of limbs; `goes_on` holds the limb in which each goes on.
-fn pieces(limbs: &[Limb], goes_on: &[Option<usize>], skeleton: &Skeleton) -> Vec<Cylinder> {
-    let branches = skeleton.botanical_branches();
+fn pieces(
+    limbs: &[Limb],
+    goes_on: &[Option<usize>],
+    branches: &BotanicalBranches,
+) -> Vec<Cylinder> {
     let mut out: Vec<Cylinder> = Vec::new();
     // The cylinders of every limb, and its branch.
     let mut of_limb: Vec<std::ops::Range<usize>> = Vec::with_capacity(limbs.len());
@@ -147,10 +150,15 @@ fn radius_by_volume(from: f64, to: f64) -> f64 {
 /// The first sample, the last, and those at which the middle line turns or tapers otherwise.
 fn ends_of_even_pieces(samples: &[CenterlineSample]) -> Vec<&CenterlineSample> {
     let mut ends: Vec<&CenterlineSample> = samples.first().into_iter().collect();
-    for pair in samples.windows(2).skip(1) {
-        let from = ends[ends.len() - 1];
-        if !is_even(from, &pair[0], &pair[1]) {
-            ends.push(&pair[0]);
+    let mut from = 0;
+    for to in 2..samples.len() {
+        let between = &samples[from + 1..to];
+        if !between
+            .iter()
+            .all(|sample| is_even(&samples[from], sample, &samples[to]))
+        {
+            from = to - 1;
+            ends.push(&samples[from]);
         }
     }
     ends.extend(samples.last().filter(|_| samples.len() > 1));
@@ -193,6 +201,40 @@ fn nearest(cylinders: &[Cylinder], range: std::ops::Range<usize>, limb: &Limb) -
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::NodeId;
+    use crate::shape::SkinWeights;
+
+    /// A limb that runs straight and tapers evenly, turns, and tapers otherwise after its next sample.
+    #[test]
+    fn a_straight_limb_that_tapers_evenly_is_one_cylinder() {
+        let sample = |x: f64, y: f64, radius: f64| CenterlineSample {
+            at: Point3::new(x, y, 0.0),
+            radius,
+            skin: SkinWeights::between(NodeId(0), NodeId(1), 1.0),
+        };
+        let samples = [
+            sample(0.0, 0.0, 4.0),
+            sample(0.0, 1.0, 3.5),
+            sample(0.0, 2.0, 3.0),
+            sample(1.0, 3.0, 2.5),
+            sample(2.0, 4.0, 1.0),
+        ];
+        let ends = ends_of_even_pieces(&samples);
+        let heights: Vec<f64> = ends.iter().map(|end| end.at.y).collect();
+        assert_eq!(heights, [0.0, 2.0, 3.0, 4.0]);
+        assert!(ends_of_even_pieces(&[]).is_empty());
+        assert_eq!(ends_of_even_pieces(&samples[..1]).len(), 1);
+        // In one place, or without one, nothing is straight.
+        let nowhere = [
+            sample(0.0, 0.0, 1.0),
+            sample(f64::NAN, 0.0, 1.0),
+            sample(0.0, 0.0, 1.0),
+        ];
+        assert_eq!(ends_of_even_pieces(&nowhere).len(), 3);
+        let radius = radius_by_volume(4.0, 2.0);
+        assert!((radius * radius - 28.0 / 3.0).abs() < 1e-12);
+        assert_eq!(radius_by_volume(3.0, 3.0), 3.0);
+    }
 
     /// A thick trunk, and a branch that begins in its middle.
     #[test]

@@ -16,7 +16,7 @@ pub struct ModelTree {
     pub nodes: Vec<ModelNode>,
     /// Metres in the unit of the file; 0 where it is not known.
     pub metres_per_unit: f64,
-    /// Whether nothing but the height says that it is in metres, as tables usually are.
+    /// Whether nothing but the height says whether it is in metres, as tables usually are.
     pub unit_is_guessed: bool,
 }
 
@@ -37,8 +37,8 @@ pub struct Wood {
     /// In the unit of the file; 0 where it is not known.
     pub radius: f64,
     pub sway: Option<Sway>,
-    /// The file gives a frequency without its interval, which does not count.
-    pub has_bare_frequency: bool,
+    /// The file gives a frequency that is not above 0 and within its interval; it is ignored.
+    pub lacks_interval: bool,
     /// The file says that nobody has seen it: a copy, a twig, or what a generator made up.
     pub is_made_up: bool,
 }
@@ -83,15 +83,16 @@ impl ModelTree {
         }
     }
 
-    /// Refuses more forks on one way from the foot than levels can be counted.
+    /// Refuses more forks on one way from the foot than levels can be counted; `joints` are nodes that count as forks,
+    /// too.
     ///
     /// # Errors
     /// There are more.
-    pub fn refuse_deep(&self) -> Result<(), ImportError> {
+    pub fn refuse_deep(&self, joints: &[bool]) -> Result<(), ImportError> {
         let children = self.children();
         let mut levels: Vec<usize> = Vec::with_capacity(self.nodes.len());
         for (i, node) in self.nodes.iter().enumerate() {
-            let is_end = children[i].len() != 1;
+            let is_end = children[i].len() != 1 || joints.get(i) == Some(&true);
             levels.push(node.parent.map_or(0, |p| levels[p] + usize::from(is_end)));
         }
         let most = levels.into_iter().max().unwrap_or_default();
@@ -111,14 +112,19 @@ impl ModelTree {
         known
     }
 
-    /// For every node whether a branch that sways otherwise goes on in the only one that it carries.
+    /// For every node whether the only branch that it carries has another sway, where both are known. What is not known
+    /// is that of the same branch, as in [`sways`](Self::sways).
     pub fn sway_changes(&self) -> Vec<bool> {
         let known = self.sways();
         let children = self.children();
         let mut changes = vec![false; self.nodes.len()];
         for (i, above) in children.iter().enumerate().skip(1) {
-            if let [only] = above[..] {
-                changes[i] = self.nodes[only].wood.sway.is_some() && known[only] != known[i];
+            let next = match above[..] {
+                [only] => self.nodes[only].wood.sway,
+                _ => None,
+            };
+            if let (Ok(below), Some(next)) = (known[i], next) {
+                changes[i] = !says_the_same(&below, &next);
             }
         }
         changes
@@ -126,13 +132,24 @@ impl ModelTree {
 
     /// Pieces of which the file says that nobody has seen them.
     pub fn made_up(&self) -> usize {
-        self.nodes.iter().filter(|n| n.wood.is_made_up).count()
+        self.pieces().filter(|wood| wood.is_made_up).count()
     }
 
-    /// Pieces with a frequency that does not count, since the file gives no interval of it.
-    pub fn bare_frequencies(&self) -> usize {
-        let nodes = self.nodes.iter();
-        nodes.filter(|node| node.wood.has_bare_frequency).count()
+    /// Pieces with a frequency that is ignored, since it is not above 0 and within an interval.
+    pub fn without_interval(&self) -> usize {
+        let pieces = self.pieces();
+        pieces.filter(|wood| wood.lacks_interval).count()
+    }
+
+    /// Pieces without a radius above 0.
+    pub fn without_radius(&self) -> usize {
+        let pieces = self.pieces();
+        pieces.filter(|wood| wood.radius <= 0.0).count()
+    }
+
+    /// All wood; the foot ends none.
+    fn pieces(&self) -> impl Iterator<Item = &Wood> {
+        self.nodes.iter().skip(1).map(|node| &node.wood)
     }
 
     /// The tree of joined places, y up. Places that are the same are one. Places that are joined to
@@ -225,11 +242,16 @@ impl Edges {
                 known.radius = own.radius;
             }
             known.sway = known.sway.or(own.sway);
-            known.has_bare_frequency |= own.has_bare_frequency;
+            known.lacks_interval |= own.lacks_interval;
             known.is_made_up |= own.is_made_up;
         }
         wood
     }
+}
+
+/// Whether two have the same frequency and damping. How far a branch sways, no table says.
+fn says_the_same(a: &Sway, b: &Sway) -> bool {
+    a.frequency_hz == b.frequency_hz && a.damping_ratio == b.damping_ratio
 }
 
 /// For each place the first one that is the same.
@@ -244,7 +266,7 @@ fn same_places(places: &[Point3<f64>]) -> Vec<usize> {
     same
 }
 
-/// All that is joined to the foot, in the order of the file as far as parents come first.
+/// All that is joined to the foot, in the order of the places as far as parents come first.
 fn from_foot(
     foot: usize,
     neighbours: &BTreeMap<usize, Vec<usize>>,
@@ -279,6 +301,7 @@ fn from_foot(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::{Excitation, SwayColumns};
 
     fn of(places: &[[f64; 3]], edges: &[[usize; 2]]) -> Result<ModelTree, ImportError> {
         ModelTree::of_edges(&Edges {
@@ -303,6 +326,52 @@ mod tests {
         let parents: Vec<Option<usize>> = tree.nodes.iter().map(|n| n.parent).collect();
         assert_eq!(parents, [None, Some(0), Some(1), Some(1)]);
         assert_eq!(tree.nodes[0].place, 2);
+    }
+
+    /// A stem of pieces one above the other, each with this frequency; 0: none.
+    fn stem(frequencies_hz: &[f64]) -> ModelTree {
+        let places: Vec<Point3<f64>> = (0..=frequencies_hz.len())
+            .map(|k| Point3::new(0.0, k as f64, 0.0))
+            .collect();
+        let mut wood = vec![Wood::default()];
+        for hz in frequencies_hz {
+            let columns =
+                SwayColumns::of_values([*hz, 0.9 * hz, 1.1 * hz, f64::NAN, f64::NAN, f64::NAN]);
+            wood.push(Wood {
+                sway: columns.sway(Excitation::Wind, f64::NAN),
+                ..Wood::default()
+            });
+        }
+        ModelTree::of_edges(&Edges {
+            edges: (0..frequencies_hz.len()).map(|k| [k, k + 1]).collect(),
+            places,
+            wood,
+            foot: Some(0),
+        })
+        .expect("a stem")
+    }
+
+    /// Amplitudes are not known, and no number is no other one.
+    #[test]
+    fn a_sway_changes_where_another_one_is_known() {
+        let changes = |hz: &[f64]| stem(hz).sway_changes();
+        assert_eq!(changes(&[0.5, 0.5, 0.5]), [false; 4]);
+        assert_eq!(changes(&[0.5, 0.5, 0.8]), [false, false, true, false]);
+        assert_eq!(changes(&[0.0, 0.0, 0.8]), [false; 4]);
+        assert_eq!(changes(&[0.8, 0.0, 0.0]), [false; 4]);
+        assert_eq!(changes(&[0.8, 0.0, 0.5]), [false, false, true, false]);
+    }
+
+    #[test]
+    fn changes_of_sway_count_as_forks_on_one_way() {
+        let alternating: Vec<f64> = (0..300).map(|k| 0.5 + f64::from(k % 2)).collect();
+        let tree = stem(&alternating);
+        assert!(tree.refuse_deep(&[]).is_ok());
+        let refused = tree.refuse_deep(&tree.sway_changes());
+        assert!(
+            matches!(refused, Err(ImportError::TooMany { .. })),
+            "{refused:?}"
+        );
     }
 
     #[test]

@@ -53,7 +53,7 @@ pub(super) fn wood(radius: f64, sway: [f64; 6], made_up: f64) -> Wood {
             0.0
         },
         sway,
-        has_bare_frequency: sway.is_none() && columns.frequency_hz > 0.0,
+        lacks_interval: sway.is_none() && columns.frequency_hz.is_finite(),
         is_made_up: made_up > 0.0,
     }
 }
@@ -67,6 +67,11 @@ pub(super) fn wood(radius: f64, sway: [f64; 6], made_up: f64) -> Wood {
 /// circle.
 pub(super) fn edges(mut segments: Vec<Segment>) -> Result<Edges, ImportError> {
     refuse_more("pieces", segments.len(), MOST_PLACES / 2)?;
+    if segments.is_empty() {
+        return Err(ImportError::bad_format(
+            "it has no row with a piece of wood",
+        ));
+    }
     if let Some(own) = segments.iter().find(|own| !is_plausible(own)) {
         return Err(ImportError::bad_format(format!(
             "piece {} has a place or a radius that no tree has",
@@ -113,9 +118,8 @@ fn joined(segments: &[Segment], parents: &[Option<usize>]) -> Edges {
         begins.push(own.start.filter(|_| own.parent.is_none()).map(|start| {
             file.places.push(start);
             file.wood.push(Wood {
-                sway: None,
-                has_bare_frequency: false,
-                ..own.wood
+                radius: own.wood.radius,
+                ..Wood::default()
             });
             file.places.len() - 1
         }));

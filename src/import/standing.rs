@@ -85,7 +85,7 @@ struct Forks {
 
 impl Forks {
     fn of(model: &ModelTree) -> Result<Self, ImportError> {
-        model.refuse_deep()?;
+        model.refuse_deep(&[])?;
         let children = model.children();
         let mut forks = Self {
             of_model: Vec::new(),

@@ -81,20 +81,22 @@ impl Verdict {
 
     /// The verdict of these findings, the worst first.
     pub fn of_findings(findings: impl IntoIterator<Item = Finding>) -> Self {
-        let mut verdict = Self::default();
-        for Finding {
+        findings.into_iter().fold(Self::default(), Self::with)
+    }
+
+    /// The same with one more finding, behind those that are as bad.
+    pub fn with(mut self, finding: Finding) -> Self {
+        let Finding {
             grade,
             reason,
             advice,
-        } in findings
-        {
-            verdict.grade = verdict.grade.max(grade);
-            verdict.reasons.push(reason);
-            if !advice.is_empty() && !verdict.advice.contains(&advice) {
-                verdict.advice.push(advice);
-            }
+        } = finding;
+        self.grade = self.grade.max(grade);
+        self.reasons.push(reason);
+        if !advice.is_empty() && !self.advice.contains(&advice) {
+            self.advice.push(advice);
         }
-        verdict
+        self
     }
 
     /// The verdict in a line: `poor, because moves by 0.4 px only; come nearer`.

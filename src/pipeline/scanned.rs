@@ -51,7 +51,7 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
 }
 
 /// A modelled tree as one of a scan, node by node; a unit of its file is so many metres. The radius of a piece is
-/// that of its middle, and that of a node the mean of what ends and what goes on there.
+/// that of its middle, and that of a node the mean of what ends there and the thickest that goes on.
 ///
 /// # Errors
 /// A radius is not known, it has no height or is far wider than high, or too many forks on one way.
@@ -60,12 +60,12 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
         height_m: metres_per_unit * model.height()?,
         ..CloudFigures::default()
     };
-    model.refuse_deep()?;
+    let sway_changes = model.sway_changes();
+    model.refuse_deep(&sway_changes)?;
     if model.nodes.iter().skip(1).any(|n| n.wood.radius <= 0.0) {
         return Err(ImportError::NoRadius);
     }
     let radii = end_radii(model);
-    let sway_changes = model.sway_changes();
     let mut nodes = Vec::with_capacity(model.nodes.len());
     for (i, node) in model.nodes.iter().enumerate() {
         let at = node.position * metres_per_unit;
@@ -77,9 +77,6 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
             is_joint: sway_changes[i],
         });
     }
-    // The foot is as thick as what stands on it.
-    let above_m = nodes.get(1).map_or(0.0, |n| n.radius);
-    nodes[0].radius = nodes[0].radius.max(above_m);
     Ok(CloudTree { nodes, figures })
 }
 
@@ -93,11 +90,11 @@ fn end_radii(model: &ModelTree) -> Vec<f64> {
     }
     let mut radii = Vec::with_capacity(model.nodes.len());
     for (node, above) in model.nodes.iter().zip(above) {
-        let own = node.wood.radius;
-        radii.push(if above > 0.0 {
-            0.5 * (own + above)
-        } else {
-            own
+        radii.push(match (node.wood.radius, above) {
+            // Nothing ends in the foot of some files.
+            (0.0, above) => above,
+            (own, 0.0) => own,
+            (own, above) => 0.5 * (own + above),
         });
     }
     radii

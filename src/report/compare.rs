@@ -105,11 +105,13 @@ pub fn compare(studies: &[Study], same_tree: Option<bool>) -> Option<Comparison>
         let fewer = first.branches.len().min(other.branches.len());
         let share = found as f64 / fewer.max(1) as f64;
         shares.push(share);
-        each.push(if sways_alike(first, other, &matches) {
-            Some(true)
-        } else {
-            told(share, fewer)
-        });
+        each.push(
+            if sways_alike(first, other, &matches) || has_its_markers(&matches) {
+                Some(true)
+            } else {
+                told(share, fewer)
+            },
+        );
     }
     let same = same_tree.or(all_one_tree(&each));
     let rows = match same {
@@ -144,6 +146,12 @@ fn sways_alike(first: &Study, other: &Study, matches: &[Match]) -> bool {
         }
     }
     alike >= LEAST_ALIKE && 2 * alike > both
+}
+
+/// Whether so many branches end in markers of the same names and about the same places, as by chance they do not.
+fn has_its_markers(matches: &[Match]) -> bool {
+    let named = matches.iter().filter(|m| m.is_by_name());
+    named.count() >= LEAST_ALIKE
 }
 
 /// Whether all captures are of the first one's tree: one that is of another is enough for trees to

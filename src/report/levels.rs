@@ -94,7 +94,9 @@ pub fn growth(study: &Study, value: impl Fn(&Sway) -> Option<f64>) -> Option<Gro
         })
         .collect();
     let n = points.len() as f64;
-    if points.len() < LEAST {
+    // Sums are rounded: of one level the squares below are not always 0.
+    let is_one_level = points.iter().all(|point| point.0 == points[0].0);
+    if points.len() < LEAST || is_one_level {
         return None;
     }
     let mean = points

@@ -4,7 +4,8 @@
 //! one does not see, so that neither numbers nor ends say much across captures. What lasts is where
 //! the points on a branch and on all that it carries lie in the picture: from the trunk's foot, in
 //! sizes of the tree, so that camera and zoom may differ. The trunk is the trunk wherever it ends;
-//! and where two branches are about as near, the one that sways at the same frequency is meant.
+//! and where two branches are about as near, the one that sways at the same frequency is meant. A branch that ends in a
+//! coloured marker is the one whose marker has the same name.
 
 use super::compare::log_change;
 use super::study::{Branch, Study};
@@ -27,11 +28,13 @@ const FOOT_PAIRS: usize = 10;
 /// Sizes of two films of one tree are as its farthest branches that were seen, which need not be
 /// the same ones.
 const SIZES: [f64; 5] = [1.0, 0.9, 1.1, 0.8, 1.25];
+/// Markers of the same name are the same if they are no farther apart: who picks them anew may do it in another order.
+const FARTHEST_NAMED: f64 = 3.0 * FARTHEST;
 /// Frequencies are the same if they differ by no more than their intervals allow, or by this share.
 const SAME_FREQUENCY: f64 = 0.02;
 
 /// What a branch of the captures so far is known again by.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Landmark {
     /// Where the points on it lie, px from the trunk's foot, and how far about that, both as in the
     /// first capture's picture.
@@ -41,11 +44,15 @@ pub struct Landmark {
     pub frequency_hz: Option<Interval>,
     /// Whether it is the trunk.
     pub is_trunk: bool,
+    /// The marker that it ends in, by the name that the user gave it.
+    pub marker: Option<String>,
 }
 
 /// What a branch was known again by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MatchedBy {
+    /// They end in markers of the same name.
+    Name,
     /// Both are the trunk.
     Trunk,
     /// They stand in the same place.
@@ -95,6 +102,7 @@ impl MatchedBy {
     /// One word for files.
     pub fn word(self) -> &'static str {
         match self {
+            Self::Name => "name",
             Self::Trunk => "trunk",
             Self::Place => "place",
             Self::Mode => "mode",
@@ -109,6 +117,17 @@ impl Match {
             Self::First { branch } | Self::Found { branch, .. } => Some(*branch),
             Self::Missing | Self::Unclear => None,
         }
+    }
+
+    /// Whether it ends in the marker of the same name.
+    pub fn is_by_name(&self) -> bool {
+        matches!(
+            self,
+            Self::Found {
+                by: MatchedBy::Name,
+                ..
+            }
+        )
     }
 
     /// How far it is off, if its place alone shows which branch it is.
@@ -128,6 +147,7 @@ impl Landmark {
             spread_px: view.scale * branch.spread_px,
             frequency_hz: branch.known().map(|sway| sway.frequency_hz),
             is_trunk,
+            marker: branch.marker.clone(),
         }
     }
 }
@@ -265,10 +285,22 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The trunk first, then the nearest pairs.
+    /// Markers first, then the trunk, then the nearest pairs.
     fn matched(mut self) -> Matched {
+        for (i, landmark) in self.known.iter().enumerate() {
+            if let Some(j) = landmark
+                .marker
+                .as_ref()
+                .and_then(|name| self.marked(i, name))
+            {
+                self.take(i, j, MatchedBy::Name);
+            }
+        }
         let trunk = self.known.iter().position(|a| a.is_trunk);
-        if let Some((i, j)) = trunk.zip(self.other.trunk()) {
+        if let Some((i, j)) = trunk.zip(self.other.trunk())
+            && self.is_open(i)
+            && !self.taken[j]
+        {
             self.take(i, j, MatchedBy::Trunk);
         }
         for (i, j) in self.near_pairs() {
@@ -281,6 +313,13 @@ impl<'a> Table<'a> {
             unclear: self.unclear,
             view: self.view,
         }
+    }
+
+    /// The branch of the capture that ends in the marker of this name, if it may be the known branch `i`.
+    fn marked(&self, i: usize, name: &str) -> Option<usize> {
+        let mut branches = self.other.branches.iter();
+        let j = branches.position(|b| b.marker.as_deref() == Some(name))?;
+        (self.off[i][j] <= FARTHEST_NAMED && !self.taken[j]).then_some(j)
     }
 
     /// Pairs that are near enough to be one branch, the nearest first.
@@ -370,6 +409,42 @@ mod tests {
 
     fn found(matches: &[Match]) -> Vec<Option<usize>> {
         matches.iter().map(Match::branch).collect()
+    }
+
+    /// Two markers that nearly change places are told apart by their names.
+    #[test]
+    fn markers_of_the_same_name_are_the_same() {
+        let mut named = [study(&TREE[..3]), study(&TREE[..3])];
+        let [near, other] = [1, 2].map(|k| TREE[k]);
+        for (k, at) in [
+            (1, near + (other - near) * 0.8),
+            (2, other + (near - other) * 0.8),
+        ] {
+            named[1].branches[k].centre_from_foot_px = at;
+        }
+        let by_place = matches(&named[0], &named[1]);
+        assert_eq!(found(&by_place), [Some(0), Some(2), Some(1)]);
+        for study in &mut named {
+            for (branch, name) in study.branches.iter_mut().zip(["A", "B", "C"]) {
+                branch.marker = Some(name.to_owned());
+            }
+        }
+        let by_name = matches(&named[0], &named[1]);
+        assert_eq!(found(&by_name), [Some(0), Some(1), Some(2)]);
+        let are_named = by_name.iter().all(|m| {
+            matches!(
+                m,
+                Match::Found {
+                    by: MatchedBy::Name,
+                    ..
+                }
+            )
+        });
+        assert!(are_named, "{by_name:?}");
+        // Far away a name says nothing.
+        named[1].branches[1].centre_from_foot_px = TREE[5];
+        let far = matches(&named[0], &named[1])[1];
+        assert!(!far.is_by_name(), "{far:?}");
     }
 
     fn by(m: &Match) -> Option<MatchedBy> {

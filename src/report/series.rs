@@ -9,8 +9,8 @@ use crate::files::WriteError;
 const BRANCH: &str = "capture,node_id,branch,parent_id";
 
 /// The angle of every branch to the one that carries it in every frame, less its mean: `angle_deg` in the picture's
-/// plane, `angle_in_space_deg` by eq. 1 of Hu et al.; and how far its end is from its place at rest, px to the right
-/// and up. What is not known is an empty cell; a capture without poses has no rows.
+/// plane, `angle_in_space_deg` by eq. 1 of Hu et al.; and how far its end is from its place at rest, px of the picture
+/// to the right and up. What is not known is an empty cell; a capture without poses has no rows.
 ///
 /// # Errors
 /// Memory cannot be had.
@@ -37,7 +37,7 @@ pub fn angles_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
 }
 
 /// The amplitude spectrum of the angle in the picture's plane of every branch, of the part of the film that its answer
-/// is of; of a branch that has none no rows.
+/// is of. Branches without a spectrum have no rows.
 ///
 /// # Errors
 /// Memory cannot be had.

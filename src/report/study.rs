@@ -107,6 +107,8 @@ pub struct Branch {
     /// that branch, 0 for the trunk.
     pub piece: String,
     pub order: u32,
+    /// The coloured marker in which it ends, by the name that the user gave it.
+    pub marker: Option<String>,
     /// The branch that carries it; `None` for the trunk.
     pub parent: Option<u32>,
     pub level: u8,
@@ -327,6 +329,7 @@ fn branch(
     Branch {
         name: own.name.0,
         piece: botanical.piece_name(node),
+        marker: None,
         order: botanical.order(node),
         parent: parent_node.filter(|p| p.parent.is_some()).map(|p| p.name.0),
         level: own.level,

@@ -20,6 +20,7 @@ pub fn study(tips: &[Point2<f64>]) -> Study {
     let branches = tips.iter().enumerate().map(|(i, tip)| Branch {
         name: i as u32 + 1,
         piece: String::new(),
+        marker: None,
         order: 0,
         parent: (i > 0).then_some(1),
         level: if i > 0 { 2 } else { 1 },

@@ -6,7 +6,7 @@ use super::film_fit::FilmFit;
 use crate::cloud::{CloudTree, verdict};
 use crate::config::{Config, LeafShow};
 use crate::document::note::{ScanFilmNote, ScanNote};
-use crate::model::{Outline, PointCloud, Swaying};
+use crate::model::{Finding, Grade, Outline, PointCloud, Swaying};
 use crate::pipeline::ScaledTree;
 use nalgebra::Vector3;
 use std::path::Path;
@@ -41,6 +41,15 @@ impl FilmOnScan {
         let unsure = "the film lies on the scan by its pairs alone, and nothing says how surely: the lines of film and \
                       scan do not confirm it; more pairs, all over the tree, make it surer";
         self.fit.off_hi.is_none().then(|| unsure.to_owned())
+    }
+
+    /// What is not as it should be of a registration that nothing but its pairs tells.
+    pub fn finding(&self) -> Option<Finding> {
+        self.fit.off_hi.is_none().then(|| Finding {
+            grade: Grade::Fair,
+            reason: "the film lies on the scan by its pairs alone".to_owned(),
+            advice: "give more pairs, all over the tree".to_owned(),
+        })
     }
 
     /// The warning where the places of the tree at rest are less sure than where it was filmed.

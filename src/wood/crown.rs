@@ -6,8 +6,9 @@ use super::contrast::Around;
 use super::foliage::Foliage;
 use super::joined::Parts;
 use super::photograph::{NotSeen, Photograph};
-use super::{ways, widened};
+use super::{Stroke, ways, widened};
 use crate::model::{BranchGraph, Outline, Size};
+use nalgebra::Point2;
 
 /// Leaves differ from what is around the crown if they do by so many standard errors. Round six trees of made
 /// photographs it is 7.1 to 23, on 24 places of their lawns 3.5 at most (even seeds of 36002 to 36006, 38002,
@@ -71,11 +72,25 @@ pub fn refuse_other(
     if is_as_around && (!holds_wood || holds_foot) {
         return Err(NotSeen::Leaves);
     }
-    let size = crown.size;
+    refuse_far(crown, branches.nodes.iter().map(|node| node.position_px))
+}
+
+/// Refuses a trunk's stroke that is apart from the crown: what little is seen along it is not that tree's.
+///
+/// # Errors
+/// It is apart, or OpenCV fails.
+pub fn refuse_far_trunk(crown: &Outline, trunk: &Stroke) -> Result<(), NotSeen> {
+    refuse_far(crown, trunk.iter().copied())
+}
+
+/// Refuses places that are all apart from the crown.
+fn refuse_far(
+    crown: &Outline,
+    places_px: impl Iterator<Item = Point2<f64>>,
+) -> Result<(), NotSeen> {
     let off_px = off_px(crown)?;
-    let nodes = branches.nodes.iter();
-    let places = nodes.filter_map(|node| size.pixel_at(node.position_px));
-    let nearest_px = places
+    let pixels = places_px.filter_map(|place| crown.size.pixel_at(place));
+    let nearest_px = pixels
         .map(|pixel| off_px[pixel])
         .fold(f32::INFINITY, f32::min);
     match f64::from(nearest_px) > FARTHEST_CROWN * side_px(crown) {
@@ -134,6 +149,14 @@ mod tests {
             graph.nodes.push(WoodNode::made_up(parent, 50.0, v));
         }
         graph
+    }
+
+    #[test]
+    fn a_trunk_s_stroke_apart_from_the_crown_is_refused() {
+        let stroke = |u: f64| vec![Point2::new(u, 95.0), Point2::new(u, 62.0)];
+        let apart = refuse_far_trunk(&crown(), &stroke(5.0));
+        assert!(matches!(apart, Err(NotSeen::Apart)), "{apart:?}");
+        assert!(refuse_far_trunk(&crown(), &stroke(50.0)).is_ok());
     }
 
     #[test]

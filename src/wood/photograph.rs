@@ -231,6 +231,9 @@ pub fn beside_leaves(
         return Err(NotSeen::Wood);
     }
     crown::refuse_other(photo.crown, &branches, mask.in_leaf, is_as_around)?;
+    if on_strokes.doubtful.contains(&0) {
+        crown::refuse_far_trunk(photo.crown, &photo.strokes[0])?;
+    }
     let level_share = branches.level_share();
     branches = without_walls(&branches, &on_strokes.is_stroke, size);
     hide_radii(&mut branches, leaves, size);
@@ -270,7 +273,10 @@ pub fn beside_leaves(
 fn other_leaves(photo: Photograph, within: &[u8]) -> Option<LeafColour> {
     let share = |colour: LeafColour| share_of(photo.picture, within, colour);
     match photo.leaves {
-        LeafHint::Of(_) => None,
+        LeafHint::Of(sought) => {
+            let is_green = share(LeafColour::Green) > LEAFY_SHARE.max(share(sought));
+            is_green.then_some(LeafColour::Green)
+        }
         LeafHint::Bare if share(LeafColour::Green) > LEAFY_SHARE => Some(LeafColour::Green),
         LeafHint::Bare | LeafHint::Unknown => {
             let is_red =

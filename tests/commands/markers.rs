@@ -233,6 +233,60 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
     );
 }
 
+/// The table of branches by forces: two films whose markers are named in another order.
+#[test]
+fn markers_of_two_films_are_matched_by_their_names() {
+    let scene = Scene::new(FRAMES, RED);
+    scene.replay("markers.json", "small");
+    let [a, b] = markers_px(0);
+    let carried = window("B", b, r#", "parent": "A""#);
+    scene.markers(&format!("{carried}, {}", window("A", a, "")));
+    scene.replay("markers.json", "large");
+    let output = scene.run("analyze small large --markers --json");
+    assert!(output.status.success(), "{}", said(&output));
+    let all: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let comparison = &all["comparison"];
+    assert_eq!(comparison["same_tree"], true, "{comparison}");
+    for row in comparison["branches"].as_array().expect("branches") {
+        assert_eq!(row["in"][1]["matched_by"], "name", "{row}");
+        let names = [0, 1].map(|k| {
+            let found = all["captures"][k]["branches"].as_array().expect("branches");
+            let node = &row["in"][k]["node_id"];
+            let branch = found.iter().find(|b| b["node_id"] == *node);
+            branch.expect("a branch")["branch"].clone()
+        });
+        assert_eq!(names[0], names[1], "{row}");
+    }
+}
+
+#[test]
+fn a_lens_and_the_time_of_rows_change_what_is_told() {
+    let scene = Scene::new(60, RED);
+    scene.replay("markers.json", "out");
+    let profile = format!(
+        r#"{{"calib_dimension": {{"w": {WIDTH}, "h": {HEIGHT}}}, "orig_dimension": {{"w": {WIDTH}, "h": {HEIGHT}}},
+            "fisheye_params": {{"camera_matrix": [[200, 0, 160], [0, 200, 120], [0, 0, 1]],
+            "distortion_coeffs": [0.1, 0.02, 0.0, 0.0]}}}}"#
+    );
+    scene.write("lens.json", &profile);
+    let plain = branches(&scene, "out --markers");
+    let output = scene.run("analyze out --markers --lens lens.json --readout-ms 20 --json");
+    assert!(output.status.success(), "{}", said(&output));
+    for what in ["where no lens distorts (lens.json)", "within 20.0 ms"] {
+        assert!(said(&output).contains(what), "{}", said(&output));
+    }
+    let straight = branches(&scene, "out --markers --lens lens.json");
+    let end = |found: &[serde_json::Value]| found[1]["end_px"][0].as_f64().expect("a place");
+    assert!((end(&plain) - end(&straight)).abs() > 0.5);
+    let endless = scene.run("analyze out --markers --lens /dev/zero");
+    assert_eq!(endless.status.code(), Some(BAD_USAGE));
+    assert!(
+        said(&endless).contains("more than 16 MB"),
+        "{}",
+        said(&endless)
+    );
+}
+
 #[test]
 fn markers_are_found_by_their_hue() {
     let scene = Scene::new(60, RED);

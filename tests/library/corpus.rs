@@ -5,7 +5,9 @@ use crate::chance::Chance;
 use crate::ros;
 use arborcam::cloud::{CloudOptions, tree_of_cloud};
 use arborcam::config::Config;
-use arborcam::import::{CloudFormat, StandingModel, joined, read_cloud, read_model, read_sketch};
+use arborcam::import::{
+    CloudFormat, StandingModel, joined, read_cloud, read_lens_profile, read_model, read_sketch,
+};
 use arborcam::model::{PixelFormat, RawFrame, Size};
 use arborcam::recording::{Head, Limits, Reader, Series};
 use arborcam::source::{self, CameraFile, kinect_rig};
@@ -130,7 +132,7 @@ fn no_text_brings_the_parsers_down() {
 
 #[test]
 fn no_camera_file_and_no_list_brings_the_readers_down() {
-    let mut cameras = 0;
+    let (mut cameras, mut lenses) = (0, 0);
     for seed in seeds("camera") {
         each(&seed, |bytes| {
             let text = String::from_utf8_lossy(bytes);
@@ -139,9 +141,13 @@ fn no_camera_file_and_no_list_brings_the_readers_down() {
             cameras += usize::from(camera.is_ok()) + usize::from(rig.is_ok());
             assert!(camera.err().is_none_or(|what| !what.contains('\n')));
             assert!(rig.err().is_none_or(|what| !what.contains('\n')));
+            let lens = read_lens_profile(bytes);
+            lenses += usize::from(lens.is_ok());
+            assert!(lens.err().is_none_or(|what| !what.contains('\n')));
         });
     }
     assert!(cameras > 10, "hardly any was ever read: {cameras}");
+    assert!(lenses > 5, "hardly any was ever read: {lenses}");
     let folder = tempfile::tempdir().expect("folder");
     for seed in seeds("list") {
         each(&seed, |bytes| {

@@ -5,7 +5,8 @@ use super::super::common::{moment, parse_within};
 use super::super::markers::MarkerFile;
 use super::super::scale::ScaleArgs;
 use crate::bounds::Bounds;
-use crate::config::{Config, ConfigError, Excited, MarkerWindow};
+use crate::config::{Config, ConfigError, Excited, MarkerWindow, check_marker_parents};
+use crate::files::{LARGEST_NOTE, read_bounded};
 use crate::import::read_lens_profile;
 use crate::model::Lens;
 use anyhow::anyhow;
@@ -90,7 +91,8 @@ pub struct LensProfile {
 
 /// Reads a lens profile.
 fn lens(path: &str) -> Result<LensProfile, String> {
-    let bytes = std::fs::read(path).map_err(|e| format!("{e}; give a file"))?;
+    let bytes =
+        read_bounded(Path::new(path), LARGEST_NOTE).map_err(|e| format!("{e}; give a file"))?;
     Ok(LensProfile {
         file: path.to_owned(),
         lens: read_lens_profile(&bytes)?,
@@ -140,7 +142,9 @@ impl FromStr for MarkerParents {
     type Err = String;
 
     fn from_str(path: &str) -> Result<Self, String> {
-        MarkerFile::read(path).map(|file| Self(file.markers))
+        let markers = MarkerFile::read(path)?.markers;
+        check_marker_parents(&markers).map_err(|e| e.to_string())?;
+        Ok(Self(markers))
     }
 }
 
@@ -185,7 +189,14 @@ impl AnalyzeArgs {
                 within_s.lo, within_s.hi
             ));
         }
+        let mut paths = BTreeSet::new();
         for file in self.files() {
+            if !paths.insert(file.path) {
+                return bad_usage(format!(
+                    "{} is given for two files; choose another name for one",
+                    file.path.display()
+                ));
+            }
             if file.path.file_name().is_none() {
                 return bad_usage(format!(
                     "--{} {} is no name for a file; choose another",

@@ -5,7 +5,7 @@ use crate::cli::command_error::CommandError;
 use crate::cli::forest::write_forest;
 use crate::cli::grow::tree_name;
 use crate::cli::output::eprint_line;
-use crate::cloud::CloudTrees;
+use crate::cloud::{CloudTrees, verdict};
 use crate::files::write_files;
 use crate::views::{StandingTree, scan_forest};
 use anyhow::anyhow;
@@ -45,7 +45,7 @@ pub(super) fn write(
         standing.push(StandingTree::of(name.clone(), tree, &drawn));
         let dir = args.out.join(name);
         drawn.write(&dir, is_stopped)?;
-        print_summary(&dir, tree, branches);
+        print_summary(&dir, tree, branches, &verdict(&tree.figures));
     }
     let Some(forest) = scan_forest(&scan.name, &standing, &found, scan.config.wood.seed.into())
     else {

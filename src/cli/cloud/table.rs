@@ -83,7 +83,9 @@ pub fn write(
     let branches = drawn.skeleton.botanical_branches().all.len();
     let is_stopped = stop.while_writing();
     match film {
-        Some(capture) => args.write_with_film(capture, &tree, &scan, drawn, is_stopped)?,
+        Some(capture) => {
+            args.write_with_film(capture, &tree, &scan, drawn, is_stopped)?;
+        }
         None => {
             let sway = sway_by_node(table, &drawn.skeleton);
             drawn.write_swaying(&args.out, &sway, is_stopped)?;

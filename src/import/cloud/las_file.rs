@@ -137,6 +137,13 @@ where
     let mut reader = Reader::new(ChunkedFile::new(input, points_end)).map_err(damaged)?;
     let said = reader.header().number_of_points();
     refuse_many(said)?;
+    let steps = reader.header().transforms();
+    if [steps.x, steps.y, steps.z]
+        .iter()
+        .any(|step| step.scale == 0.0)
+    {
+        return Err(ImportError::bad_format("the scale of its coordinates is 0"));
+    }
     // The decompressor goes on behind the end of the file.
     if said > MOST_POINTS_OF_BYTE * size {
         return Err(ImportError::bad_format(format!(
