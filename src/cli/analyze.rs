@@ -215,8 +215,8 @@ fn analyse_capture(
     {
         notes.add(
             "note",
-            "no marker of the file has a parent, and all begin at the foot; with --markers alone parents follow from the \
-             motion"
+            "no marker of the file has a parent, and all begin at the foot; with --markers alone parents follow \
+             from the motion"
                 .to_owned(),
         );
     }

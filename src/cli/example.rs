@@ -105,8 +105,8 @@ pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
     let bare = tree.without_interval();
     if bare > 0 {
         eprint_line(&format!(
-            "arborcam: warning: {}: the frequencies of {bare} pieces are left out: they are not above 0, or not within an \
-             interval (frequency_lo_hz, frequency_hi_hz)",
+            "arborcam: warning: {}: the frequencies of {bare} pieces are left out: they are not above 0, or not \
+             within an interval (frequency_lo_hz, frequency_hi_hz)",
             path.display()
         ));
     }
@@ -120,8 +120,8 @@ pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
     let made_up = tree.made_up();
     if made_up > 0 {
         eprint_line(&format!(
-            "arborcam: note: {}: nobody has seen {made_up} of {all} pieces (copies, twigs, grown); the new tree does not \
-             keep that mark",
+            "arborcam: note: {}: nobody has seen {made_up} of {all} pieces (copies, twigs, grown); the new tree does \
+             not keep that mark",
             path.display()
         ));
     }

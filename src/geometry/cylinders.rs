@@ -31,9 +31,9 @@ pub struct Cylinder {
 }
 
 /// The limbs as cylinders, parents first; each has the volume of what it stands for. One that lies wholly within what
-/// carries it is only as thick as the next. What is straight and tapers evenly is one cylinder; pieces without length are
-/// left out. Branches and orders are those of [`Skeleton::botanical_branches`]; a twig goes on in a branch that ends
-/// where it begins, or leaves it.
+/// carries it is only as thick as the next. What is straight and tapers evenly is one cylinder; pieces without length
+/// are left out. Branches and orders are those of [`Skeleton::botanical_branches`]; a twig goes on in a branch that
+/// ends where it begins, or leaves it.
 pub fn cylinders_by_branch(limbs: &[Limb], skeleton: &Skeleton) -> Vec<Cylinder> {
     let branches = skeleton.botanical_branches();
     let mut goes_on = continuations(limbs);

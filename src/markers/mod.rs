@@ -3,8 +3,8 @@
 //! Each marker has a histogram of hues, taken from its window in the first frame, and a window that
 //! moves to the middle of what is likely in each next frame: mean shift of a window of fixed size, or
 //! CamShift (Bradski 1998). A marker that is hidden is looked for in windows all over the places that it can
-//! have reached (the paper enlarges its window to four sides), or set back by the user. No two markers share a blob. Places are the weighted middles of the
-//! likely pixels, so that they are finer than a pixel.
+//! have reached (the paper enlarges its window to four sides), or set back by the user. No two markers share a
+//! blob. Places are the weighted middles of the likely pixels, so that they are finer than a pixel.
 
 mod area;
 mod blobs;

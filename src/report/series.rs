@@ -69,3 +69,49 @@ fn push_branch(table: &mut TableWriter<Vec<u8>>, study: &Study, branch: &Branch)
         None => table.text(""),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::Spectrum;
+    use crate::report::tests::{TREE, study};
+    use nalgebra::Vector2;
+
+    /// Of two branches the second has two angles, one of them not seen, and a spectrum of two bins.
+    fn swaying() -> Study {
+        let mut study = study(&TREE[..2]);
+        study.name = "oak".to_owned();
+        let branch = &mut study.branches[1];
+        branch.piece = "limb_1".to_owned();
+        branch.times_s = vec![0.0, 0.1];
+        branch.plane_deg = vec![1.5, f64::NAN];
+        branch.space_deg = vec![-2.5, f64::NAN];
+        branch.way_px = vec![Vector2::new(3.0, -4.0), Vector2::new(f64::NAN, f64::NAN)];
+        branch.spectrum = Some(Spectrum {
+            bin_hz: 0.25,
+            amplitude: vec![0.0, 0.75],
+        });
+        study
+    }
+
+    fn text(bytes: Result<Vec<u8>, WriteError>) -> String {
+        String::from_utf8(bytes.expect("a table")).expect("text")
+    }
+
+    #[test]
+    fn every_angle_is_a_row_and_what_was_not_seen_is_empty() {
+        let table = text(angles_csv(&[swaying()]));
+        let rows: Vec<&str> = table.lines().skip(1).collect();
+        assert_eq!(
+            rows,
+            ["oak,2,limb_1,1,0,1.5,-2.5,3,-4", "oak,2,limb_1,1,0.1,,,,"]
+        );
+    }
+
+    #[test]
+    fn every_bin_is_a_row() {
+        let table = text(spectra_csv(&[swaying()]));
+        let rows: Vec<&str> = table.lines().skip(1).collect();
+        assert_eq!(rows, ["oak,2,limb_1,1,0,0", "oak,2,limb_1,1,0.25,0.75"]);
+    }
+}
