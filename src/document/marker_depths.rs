@@ -154,7 +154,7 @@ fn is_jump(own: &DepthAt, about: &[DepthAt]) -> bool {
 mod tests {
     use super::*;
 
-    /// A marker that swings by 0.1 m in 30 frames, noise of some mm, and three frames of a twig before it.
+    /// A marker that swings by 0.1 m in 30 frames, noise of some mm, and a twig before it in three frames.
     #[test]
     fn depths_of_something_before_the_marker_are_left_out() {
         let mut depths_m: Vec<f64> = (0..120)

@@ -23,26 +23,27 @@ pub fn read_model(bytes: &[u8], path: &Path) -> Result<MovingModel, ImportError>
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(ImportError::bad_format("it is empty"));
     }
-    let mut is_table = false;
-    let edges = match ending.to_str().unwrap_or_default() {
+    let tree = match ending.to_str().unwrap_or_default() {
         "glb" | "gltf" => return gltf_skeleton::read(bytes, path),
-        "obj" => obj::edges(&String::from_utf8_lossy(bytes))?,
-        "ply" => ply::edges(bytes)?,
-        ending => {
-            is_table = true;
-            match WoodTable::of(&begin_of(bytes)) {
-                Some(WoodTable::Cylinders) => cylinders::edges(bytes)?,
-                Some(WoodTable::Treefile) => treefile::edges(&String::from_utf8_lossy(bytes))?,
-                None => return Err(no_table(bytes, path, ending)),
-            }
-        }
+        "obj" => ModelTree::of_edges(&obj::edges(&String::from_utf8_lossy(bytes))?)?,
+        "ply" => ModelTree::of_edges(&ply::edges(bytes)?)?,
+        ending => tree_of_table(bytes, path, ending)?.in_metres(),
     };
-    let tree = ModelTree::of_edges(&edges)?;
     Ok(MovingModel {
-        tree: if is_table { tree.in_metres() } else { tree },
+        tree,
         poses: Vec::new(),
         step_s: 0.0,
     })
+}
+
+/// The tree of a table of wood, whatever the file's ending is.
+fn tree_of_table(bytes: &[u8], path: &Path, ending: &str) -> Result<ModelTree, ImportError> {
+    let edges = match WoodTable::of(&begin_of(bytes)) {
+        Some(WoodTable::Cylinders) => cylinders::edges(bytes)?,
+        Some(WoodTable::Treefile) => treefile::edges(&String::from_utf8_lossy(bytes))?,
+        None => return Err(no_table(bytes, path, ending)),
+    };
+    ModelTree::of_edges(&edges)
 }
 
 /// Why what is no table of wood and has this ending is not read.

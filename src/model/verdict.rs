@@ -84,7 +84,7 @@ impl Verdict {
         findings.into_iter().fold(Self::default(), Self::with)
     }
 
-    /// The same with one more finding, behind those that are as bad.
+    /// The same with one more finding at the end, which is no worse than those before.
     pub fn with(mut self, finding: Finding) -> Self {
         let Finding {
             grade,

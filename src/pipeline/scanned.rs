@@ -62,7 +62,7 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
     };
     let sway_changes = model.sway_changes();
     model.refuse_deep(&sway_changes)?;
-    if model.nodes.iter().skip(1).any(|n| n.wood.radius <= 0.0) {
+    if model.without_radius() > 0 {
         return Err(ImportError::NoRadius);
     }
     let radii = end_radii(model);

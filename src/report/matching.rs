@@ -411,7 +411,7 @@ mod tests {
         matches.iter().map(Match::branch).collect()
     }
 
-    /// Two markers that nearly change places are told apart by their names.
+    /// Two markers that nearly change places are known by their names.
     #[test]
     fn markers_of_the_same_name_are_the_same() {
         let mut named = [study(&TREE[..3]), study(&TREE[..3])];
@@ -431,16 +431,7 @@ mod tests {
         }
         let by_name = matches(&named[0], &named[1]);
         assert_eq!(found(&by_name), [Some(0), Some(1), Some(2)]);
-        let are_named = by_name.iter().all(|m| {
-            matches!(
-                m,
-                Match::Found {
-                    by: MatchedBy::Name,
-                    ..
-                }
-            )
-        });
-        assert!(are_named, "{by_name:?}");
+        assert!(by_name.iter().all(Match::is_by_name), "{by_name:?}");
         // Far away a name says nothing.
         named[1].branches[1].centre_from_foot_px = TREE[5];
         let far = matches(&named[0], &named[1])[1];

@@ -1,12 +1,10 @@
 //! Angles over time and their spectra as tidy tables (CSV), after Hu et al. (figs. 6 and 7): a row for each branch
 //! and moment, or frequency.
 
-use super::study::{Branch, Study};
+use super::study::Study;
+use super::tidy::{BRANCH_COLUMNS, push_name};
 use crate::document::TableWriter;
 use crate::files::WriteError;
-
-/// The columns that say of which branch a row is.
-const BRANCH: &str = "capture,node_id,branch,parent_id";
 
 /// The angle of every branch to the one that carries it in every frame, less its mean: `angle_deg` in the picture's
 /// plane, `angle_in_space_deg` by eq. 1 of Hu et al.; and how far its end is from its place at rest, px of the picture
@@ -15,12 +13,14 @@ const BRANCH: &str = "capture,node_id,branch,parent_id";
 /// # Errors
 /// Memory cannot be had.
 pub fn angles_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
-    let header = format!("{BRANCH},time_s,angle_deg,angle_in_space_deg,right_px,up_px");
+    let header =
+        format!("capture,{BRANCH_COLUMNS},time_s,angle_deg,angle_in_space_deg,right_px,up_px");
     let mut table = TableWriter::new("the table of angles", &header, Vec::new())?;
     for study in studies {
         for branch in &study.branches {
             for (k, time_s) in branch.times_s.iter().enumerate() {
-                push_branch(&mut table, study, branch);
+                table.text(&study.name);
+                push_name(&mut table, branch);
                 table.number(*time_s, 6);
                 for series in [&branch.plane_deg, &branch.space_deg] {
                     table.number(series.get(k).copied().unwrap_or(f64::NAN), 5);
@@ -42,7 +42,7 @@ pub fn angles_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
 /// # Errors
 /// Memory cannot be had.
 pub fn spectra_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
-    let header = format!("{BRANCH},frequency_hz,amplitude_deg");
+    let header = format!("capture,{BRANCH_COLUMNS},frequency_hz,amplitude_deg");
     let mut table = TableWriter::new("the table of spectra", &header, Vec::new())?;
     for study in studies {
         for branch in &study.branches {
@@ -50,7 +50,8 @@ pub fn spectra_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
                 continue;
             };
             for (k, amplitude_deg) in spectrum.amplitude.iter().enumerate() {
-                push_branch(&mut table, study, branch);
+                table.text(&study.name);
+                push_name(&mut table, branch);
                 table.number(k as f64 * spectrum.bin_hz, 5);
                 table.number(*amplitude_deg, 6);
                 table.end_row()?;
@@ -58,16 +59,6 @@ pub fn spectra_csv(studies: &[Study]) -> Result<Vec<u8>, WriteError> {
         }
     }
     table.finish()
-}
-
-fn push_branch(table: &mut TableWriter<Vec<u8>>, study: &Study, branch: &Branch) {
-    table.text(&study.name);
-    table.count(branch.name);
-    table.text(&branch.piece);
-    match branch.parent {
-        Some(parent) => table.count(parent),
-        None => table.text(""),
-    }
 }
 
 #[cfg(test)]

@@ -12,11 +12,13 @@ use std::collections::{BTreeMap, BTreeSet};
 /// The columns before the user's notes, and those after them, before and after frequency and
 /// damping.
 const BEFORE_NOTES: &str = "tree_branch,capture,captured_at";
-const BEFORE_SWAY: &str = "node_id,branch,parent_id,level,order,points,matched_by,off,excitation";
+const BEFORE_SWAY: &str = "level,order,points,matched_by,off,excitation";
 const AFTER_SWAY: &str = "amplitude_deg,amplitude_px,amplitude_m,unidentified,\
                           frequency_to_first,frequency_to_first_lo,frequency_to_first_hi,\
                           damping_to_first,damping_to_first_lo,damping_to_first_hi,\
                           spectrum_peak_hz,half_power_damping";
+/// The columns that say which branch a row is of.
+pub(super) const BRANCH_COLUMNS: &str = "node_id,branch,parent_id";
 /// What a note's column begins with, so that no note is taken for a column of ours.
 const NOTE: &str = "note_";
 
@@ -29,7 +31,8 @@ pub fn csv(studies: &[Study], comparison: Option<&Comparison>) -> Result<Vec<u8>
     let notes = keys.iter().map(|key| format!(",{NOTE}{key}"));
     let notes: String = notes.collect();
     let sway = SwayColumns::NAMES.join(",");
-    let header = format!("{BEFORE_NOTES}{notes},{BEFORE_SWAY},{sway},{AFTER_SWAY}");
+    let header =
+        format!("{BEFORE_NOTES}{notes},{BRANCH_COLUMNS},{BEFORE_SWAY},{sway},{AFTER_SWAY}");
     let mut table = TableWriter::new("the table", &header, Vec::new())?;
     let tree = TreeBranches::of(studies, comparison);
     for (k, study) in studies.iter().enumerate() {
@@ -105,6 +108,16 @@ impl TreeBranches {
     }
 }
 
+/// The cells of [`BRANCH_COLUMNS`].
+pub(super) fn push_name(table: &mut TableWriter<Vec<u8>>, branch: &Branch) {
+    table.count(branch.name);
+    table.text(&branch.piece);
+    match branch.parent {
+        Some(parent) => table.count(parent),
+        None => table.text(""),
+    }
+}
+
 /// Which branch it is, and by what it was known again.
 fn push_branch(
     table: &mut TableWriter<Vec<u8>>,
@@ -112,12 +125,7 @@ fn push_branch(
     branch: &Branch,
     found: Option<Match>,
 ) {
-    table.count(branch.name);
-    table.text(&branch.piece);
-    match branch.parent {
-        Some(parent) => table.count(parent),
-        None => table.text(""),
-    }
+    push_name(table, branch);
     table.count(branch.level);
     table.count(branch.order);
     table.count(branch.points);

@@ -1,6 +1,7 @@
 //! `arborcam analyze`: what a user gets from captures, and what bad input gets.
 
 use crate::support::{self, names_in, replayed_by_motion};
+use crate::to_folder::records;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -686,12 +687,12 @@ fn angles_and_their_spectra_are_written_as_tables() {
     let capture = &told["captures"][0];
     let frames = capture["frames"].as_u64().expect("frames");
     let branches = capture["branches"].as_array().expect("branches");
-    let rows = rows_of(&angles);
+    let rows = records(Path::new(&angles));
     assert_eq!(rows.len() as u64, frames * branches.len() as u64);
     let known = rows.iter().filter(|row| !row["angle_deg"].is_empty());
     assert!(known.count() > rows.len() / 2);
     let mut largest: BTreeMap<String, (f64, f64)> = BTreeMap::new();
-    for row in rows_of(&spectra) {
+    for row in records(Path::new(&spectra)) {
         let [hz, deg] =
             ["frequency_hz", "amplitude_deg"].map(|name| row[name].parse().expect("number"));
         let peak = largest.entry(row["node_id"].clone()).or_insert((hz, deg));
@@ -711,11 +712,6 @@ fn angles_and_their_spectra_are_written_as_tables() {
     assert!(with_peak > 0);
     let again = analyze(&[&dir], &["--angles", &angles]);
     assert_eq!(again.status.code(), Some(FAILED), "it was overwritten");
-}
-
-fn rows_of(path: &str) -> Vec<BTreeMap<String, String>> {
-    let mut table = csv::Reader::from_path(path).expect("table");
-    table.deserialize().map(|row| row.expect("row")).collect()
 }
 
 #[test]

@@ -2,12 +2,11 @@
 
 use crate::chance::Chance;
 use crate::support::names_in;
-use crate::to_folder::{BAD_USAGE, FAILED, NO_INPUT, arborcam, done};
+use crate::to_folder::{BAD_USAGE, FAILED, NO_INPUT, arborcam, done, records};
 use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
 use arborcam::model::{NodeId, NodeKind};
 use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::BufReader;
@@ -361,12 +360,6 @@ fn rows_with_the_same_sway_are_one_branch() {
         .map(|sway| sway.frequency_hz.value)
         .collect();
     assert_eq!(hz, [0.5, 0.8]);
-}
-
-/// The rows of a table by the names of its columns.
-fn records(path: &Path) -> Vec<BTreeMap<String, String>> {
-    let mut table = csv::Reader::from_path(path).expect("table");
-    table.deserialize().map(|row| row.expect("row")).collect()
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Commands that make a folder of one file.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -25,4 +26,10 @@ pub fn done(arguments: &[&str], out: &Path) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{arguments:?}: {said}");
     said
+}
+
+/// The rows of a table by the names of its columns.
+pub fn records(path: &Path) -> Vec<BTreeMap<String, String>> {
+    let mut table = csv::Reader::from_path(path).expect("table");
+    table.deserialize().map(|row| row.expect("row")).collect()
 }
