@@ -22,6 +22,8 @@ Writes to OUT_DIR/NAME, 640x360 at 30 frames/s:
   grid.npz       up to 2500 surface points seen in frame 0: pix0 (K, 2), branch (K), pos_2d (frames, K, 2), px
 
 Pixels: the centre of the top left one is (0, 0), u right, v down. Metres: x right, y up, z towards the viewer, foot at 0.
+--acts-back makes the tree one structure (made_films/structure.py): its modes are in truth.json, with those in which each branch
+turns; a branch's freq_hz is that which it would have alone. The rope pulls at the trunk or at --rope-at, and bends what lies below it.
 --tag hangs a printed tag beside the tree, which stands still whatever its background does.
 --bad makes a film hard, and may be given several times. The tree and its motion are those of the seed without it, and all
 truth is that of the camera and the tree at the beginning of the film:
@@ -40,7 +42,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from made_films import bad_input, depth, markers, motion, picture, scenery, surface, tag, tree, truth
+from made_films import bad_input, depth, markers, motion, picture, scenery, structure, surface, tag, tree, truth
 
 DEFAULT_SECONDS = {"release": 11.0, "held": 11.0, "wind": 14.0}
 
@@ -62,20 +64,32 @@ def main():
     parser.add_argument("--force", type=float, default=1.0, help="times as strong a pull")
     parser.add_argument("--roll", type=float, default=0.0, metavar="DEG", help="the camera is rolled: the tree leans to the right in the picture")
     parser.add_argument("--rope-at", type=int, metavar="BRANCH", help="the rope is on this branch (its id in truth.json): it and what "
-                        "carries it are bent, the others are only shaken by the release; without it all are bent")
+                        "carries it are bent, the others are only shaken by the release; without it all are bent, or with --acts-back the trunk")
+    parser.add_argument("--acts-back", nargs="?", type=float, const=1.0, metavar="TIMES", help="branches act back on what carries them; "
+                        "TIMES the usual frequency of each branch but the trunk, which it would have alone")
     args = parser.parse_args()
+    if args.acts_back is not None and not args.acts_back > 0:
+        parser.error("--acts-back needs TIMES above 0")
     seconds = args.seconds or DEFAULT_SECONDS[args.mode]
     rope = tree.Rope(args.rope_at, args.force)
     make(args.out_dir / args.name, args.seed, args.look == "leaves", args.mode, round(seconds * picture.FPS), args.bad, args.markers,
-         args.depth, rope, args.roll, args.tag)
+         args.depth, rope, args.roll, args.tag, args.acts_back)
 
 
-def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None, roll_deg=0.0, has_tag=False):
+def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=False, rope=None, roll_deg=0.0, has_tag=False,
+         higher=None):
     rng, bad = np.random.default_rng(seed), bad_input.BadInput(bad_kinds, leafy)
     branches, pull_direction = tree.grow(rng, leafy)
-    if rope:
+    rope = rope or tree.Rope()
+    whole = None
+    if higher is not None:
+        tree.raise_frequencies(branches, higher)
+        whole = structure.Structure(branches)
+    if whole and mode != "wind":
+        whole.pull(pull_direction, rope)
+    else:
         rope.bend(branches)
-    theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS)
+    theta_rad, drive = motion.sway(rng, branches, mode, np.arange(frames) / picture.FPS, whole)
     theta_rad = bad.sways(theta_rad)
     pose = motion.Pose(branches, theta_rad)
     camera = picture.Camera.framing(rng, pose.points_m)
@@ -111,6 +125,10 @@ def make(folder, seed, leafy, mode, frames, bad_kinds, n_markers=0, has_depth=Fa
                 camera=truth.of_camera(camera), motion=drive, bad_input=bad_kinds,
                 camera_shift_px=[truth.rounded(bad.moves.shift_px(f / picture.FPS)) for f in range(frames)],
                 branches=truth.of_branches(branches, pose, camera, branch, facts))
+    if whole:
+        film.update(modes=whole.as_truth())
+        for fact, modes in zip(film["branches"], whole.modes_of_branches(theta_rad)):
+            fact["modes"] = modes
 
     folder.mkdir(parents=True, exist_ok=True)
     out = depth.DepthFilm(folder, seed, camera) if has_depth else None

@@ -10,11 +10,15 @@ One row a film:
   seen      share of the frames without the board   lost      markers that are not seen in the last two seconds
   other     share of the places that are more than a marker's width from the true one: they are on another thing
   board     px between the true place and the hidden marker's in the two seconds after the board, median
-  first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped)
+  first Hz  of the trunk's marker branch: by the analysis, by the largest peak of its angle's spectrum; true (damped). Of a tree whose
+            branches act back: that of its first two modes which is nearer (the trunk swings to two sides)
+  bins      branches but the trunk whose largest peak is in the bin of the trunk's, of the true angles in the picture; by the analysis; branches in which
+            the two are in the same bin (Hu et al. Table 1; a bin is one over the length of the film)
 A film with depth has a line more for each branch, on its angle in space to what carries it (`analyze --angles`) against that of the true places:
 standard deviation of their difference in degrees, and as a share of that of the true angle. Both are turned to the side on which they agree better,
 and means are taken off. At the end, for all films: branches with an answer, and how many are right. A branch of one marker may be two or three of the tree: an answer is
 held against that true branch between the marker and its parent whose frequency is nearest. One with no true branch between is wrong.
+Of a tree whose branches act back it is held against the nearest of the modes in which such branches turn against their carriers.
 """
 import argparse, csv, json, subprocess, tempfile
 from collections import defaultdict
@@ -36,7 +40,7 @@ def main():
     parser.add_argument("--out", type=Path, help="keeps the captures there")
     args = parser.parse_args()
     args.arborcam = args.arborcam.resolve()
-    print(f"{'film':<12}{'markers':>9}{'err px':>8}{'95 %':>7}{'worst':>7}{'other':>8}{'seen':>7}{'lost':>6}{'board':>7}{'first Hz':>10}{'peak':>8}{'true':>8}")
+    print(f"{'film':<12}{'markers':>9}{'err px':>8}{'95 %':>7}{'worst':>7}{'other':>8}{'seen':>7}{'lost':>6}{'board':>7}{'first Hz':>10}{'peak':>8}{'true':>8}{'bins':>18}")
     with tempfile.TemporaryDirectory() as work:
         rows = [row(args, film, (args.out or Path(work)) / film.name) for film in args.films]
     errors = np.concatenate([r["errors"] for r in rows])
@@ -44,10 +48,12 @@ def main():
     print(f"all films: median {np.median(errors):.2f} px, 95 % {np.quantile(errors, 0.95):.2f} px, on another thing {100 * other.mean():.2f} %, "
           f"seen {100 * np.mean([r['seen'] for r in rows]):.1f} %, lost {sum(r['lost'] for r in rows)} of {sum(r['markers'] for r in rows)}")
     for name in ("analysis", "peak"):
-        off = np.array([r[name] - r["true_hz"] for r in rows])
+        off = np.array([r[name] - r["true_hz"][name] for r in rows])
         told = np.isfinite(off)
         print(f"first frequency by {name}: {told.sum()} of {len(off)}, largest error {np.abs(off[told]).max(initial=0):.4f} Hz, "
               f"within 0.01 Hz {np.sum(np.abs(off[told]) <= 0.01)}")
+    bins = np.sum([r["bins"] for r in rows], axis=0)
+    print("largest peak in the bin of the trunk's: true {0} of {3}, by the analysis {1}; in the right bin {2}".format(*bins))
     told = np.concatenate([r["answers"] for r in rows])
     print(f"branches with an answer: {len(told)} of {sum(r['markers'] for r in rows)}, within {RIGHT_WITHIN:.0%} {told[:, 0].sum():.0f}, "
           f"in its interval {told[:, 1].sum():.0f}, damping in its {np.nansum(told[:, 2]):.0f} of {np.isfinite(told[:, 2]).sum()}")
@@ -81,13 +87,58 @@ def row(args, film, out):
     trunk = truth["markers"][0]
     branches = study_of(args.arborcam, film, out)
     analysis, peak = frequencies(branches, trunk["name"])
-    true_hz = trunk["freq_hz"] * np.sqrt(1 - trunk["damping"] ** 2)
+    true_hz = first_hz(film, trunk, analysis)
+    true_peak_hz = first_hz(film, trunk, peak)
+    bins = same_bins(film, truth["markers"], branches)
     print(f"{film.name:<12}{len(matched):>5}/{len(truth['markers']):<3}{np.median(errors):>8.2f}{np.quantile(errors, 0.95):>7.2f}"
-          f"{errors.max():>7.1f}{100 * other.mean():>7.1f}%{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}", flush=True)
+          f"{errors.max():>7.1f}{100 * other.mean():>7.1f}%{np.mean(shares):>7.2f}{lost:>6}{board:>7.2f}{analysis:>10.4f}{peak:>8.4f}{true_hz:>8.4f}"
+          f"{'%d, %d, %d of %d' % tuple(bins):>18}", flush=True)
     for line in angles_in_space(args.arborcam, film, out, truth["markers"]):
         print("  " + line, flush=True)
-    return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz=true_hz,
-                answers=answers(film, branches))
+    return dict(errors=errors, other=other, seen=np.mean(shares), markers=len(truth["markers"]), lost=lost, analysis=analysis, peak=peak, true_hz={"analysis": true_hz, "peak": true_peak_hz},
+                answers=answers(film, branches), bins=bins)
+
+
+def first_hz(film, trunk, told):
+    """The true damped frequency of the trunk's marker; of two modes that which is nearer to what was told."""
+    modes = json.loads((film / "truth.json").read_text()).get("modes", [trunk])[:2]
+    damped = [m["freq_hz"] * np.sqrt(1 - m["damping"] ** 2) for m in modes]
+    return min(damped, key=lambda hz: abs(hz - told))
+
+
+def same_bins(film, markers, branches):
+    """Of the branches but the trunk: those in the trunk's bin by the true angles, by the analysis, in the right bin, and all that have a peak."""
+    truth = json.loads((film / "truth.json").read_text())
+    foot = np.array(truth["branches"][0]["rest_base_2d"])
+    film_s = truth["n_frames"] / truth["fps"]
+    by_name = {m["name"]: m for m in markers}
+    true = {m["name"]: largest_bin(angle_in_picture(m, by_name, foot)) for m in markers}
+    told = {b["branch"]: round(b["spectrum_peak_hz"] * film_s) for b in branches if b["spectrum_peak_hz"] is not None}
+    named = [m["name"] for m in markers if m["branch"] != 0 and m["name"] in told]
+    trunk = markers[0]["name"]
+    return np.array([sum(true[n] == true[trunk] for n in named), sum(told[n] == told.get(trunk) for n in named),
+                     sum(true[n] == told[n] for n in named), len(named)])
+
+
+def angle_in_picture(marker, by_name, foot):
+    """Of a branch to what carries it, radians in each frame; of one that grows from the foot, to the upright."""
+    parent = by_name.get(marker["parent"])
+    if parent is None:
+        return direction(np.array(marker["places_px"]) - foot)
+    below = by_name.get(parent["parent"])
+    joint = np.array(parent["places_px"])
+    carrier = joint - (foot if below is None else np.array(below["places_px"]))
+    return direction(np.array(marker["places_px"]) - joint) - direction(carrier)
+
+
+def direction(way):
+    return np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+
+
+def largest_bin(angle):
+    """Of the spectrum; the first two bins are drift."""
+    amplitude = np.abs(np.fft.rfft(angle - angle.mean()))
+    return 2 + int(np.argmax(amplitude[2:]))
 
 
 def angles_in_space(arborcam, film, capture, markers):
@@ -205,7 +256,8 @@ def frequencies(branches, name):
 def answers(film, branches):
     """A row for each answer: right, within its interval, damping within its interval (NaN without); held against that true branch
     between the marker and its parent whose frequency is nearest."""
-    true = json.loads((film / "truth.json").read_text())["branches"]
+    truth = json.loads((film / "truth.json").read_text())
+    true, modes = truth["branches"], truth.get("modes")
     markers = {m["name"]: m for m in json.loads((film / "truth_markers.json").read_text())["markers"]}
     rows = []
     for branch in branches:
@@ -215,7 +267,7 @@ def answers(film, branches):
         ends_on = markers[marker["parent"]]["branch"] if marker["parent"] else -1
         at, between = marker["branch"], []
         while at not in (-1, ends_on):
-            between.append(true[at])
+            between += [modes[m] for m in true[at]["modes"]] if modes else [true[at]]
             at = true[at]["parent"]
         if not between:
             rows.append((False, False, False))

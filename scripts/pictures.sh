@@ -307,28 +307,29 @@ markers() {
 }
 
 # Figures 6, 7, 9 to 12 and 14 of Hu et al., and their Table 1, of made films and scans: a tree with ten markers that is pulled with a
-# rope on its whole crown, on one branch with two forces, and on another one; a second tree; a scan of the first with what a film of
-# it told, and scans of both with the trees that space colonisation grows.
+# rope on its trunk, on one branch with two forces, and on another one; a second tree; a scan of the first with what a film of
+# it told, and scans of both with the trees that space colonisation grows. In films with markers branches act back on what carries them.
 hu() {
     local seed=53101 other=53102 name
-    pulled all $seed
-    pulled at-1 $seed --rope-at 1
-    pulled at-1-half $seed --rope-at 1 --force 0.5
-    pulled at-3 $seed --rope-at 3
-    pulled other $other
+    local structure=(--acts-back 1.6)
+    pulled all $seed "${structure[@]}"
+    pulled at-1 $seed --rope-at 1 "${structure[@]}"
+    pulled at-1-half $seed --rope-at 1 --force 0.5 "${structure[@]}"
+    pulled at-3 $seed --rope-at 3 "${structure[@]}"
+    pulled other $other "${structure[@]}"
     "$python" scripts/pictures.py angles "$to/hu-angles.png" \
         "branch 3|time|$(swing at-1 3)" "its spectrum|spectrum|$(swing at-1 3)" "branch 18, on branch 3|time|$(swing at-1 18)" \
         "its spectrum|spectrum|$(swing at-1 18)" "branch 1|time|$(swing at-1 1)" "its spectrum|spectrum|$(swing at-1 1)" \
         "branch 7, on branch 1|time|$(swing at-1 7)" "its spectrum|spectrum|$(swing at-1 7)"
     told "$to/hu-angles.png"
     "$python" scripts/pictures.py angles "$to/hu-spectra.png" \
-        "branch 3, rope at three places|spectrum|$(swing at-1 3 "on branch 1"),$(swing at-3 3 "on branch 3"),$(swing all 3 "on the crown")" \
-        "branch 1, rope at three places|spectrum|$(swing at-1 1 "on branch 1"),$(swing at-3 1 "on branch 3"),$(swing all 1 "on the crown")" \
+        "branch 3, rope at three places|spectrum|$(swing at-1 3 "on branch 1"),$(swing at-3 3 "on branch 3"),$(swing all 3 "on the trunk")" \
+        "branch 1, rope at three places|spectrum|$(swing at-1 1 "on branch 1"),$(swing at-3 1 "on branch 3"),$(swing all 1 "on the trunk")" \
         "one tree|spectrum|$(swing all 1 1),$(swing all 3 3),$(swing all 5 5),$(swing all 18 18)" \
-        "another tree|spectrum|$(swing other 3 3),$(swing other 5 5),$(swing other 10 10),$(swing other 8 8)" \
+        "another tree|spectrum|$(swing other 3 3),$(swing other 12 12),$(swing other 10 10),$(swing other 8 8)" \
         "trunk, two forces|spectrum|$(swing at-1 0 full),$(swing at-1-half 0 half)" \
         "branch 3, two forces|spectrum|$(swing at-1 3 full),$(swing at-1-half 3 half)" \
-        "branch 18 of the third level|spectrum|$(swing at-1 18 "on branch 1"),$(swing at-3 18 "on branch 3"),$(swing all 18 "on the crown")"
+        "branch 18 of the third level|spectrum|$(swing at-1 18 "on branch 1"),$(swing at-3 18 "on branch 3"),$(swing all 18 "on the trunk")"
     told "$to/hu-spectra.png"
     for name in at-1-half at-1; do
         "$arborcam" analyze "$work/pulled-$name-tree" --markers --json >"$work/pulled-$name.json" 2>"$work/pulled.log" ||

@@ -17,16 +17,18 @@ MODEL = ("branch i: th''+2*zeta*w*th'+w^2*(th-drive_i(t))=0, th=(th1,th2), w=2*p
          "th1*e1+th2*e2 in the parent's frame, at arc fraction s by ((1-flex)+flex*s)*th; children ride on the parent")
 
 
-def sway(rng, branches, mode, time_s):
-    """(frames, branches, 2) angles in rad, and what truth.json says of the drive."""
+def sway(rng, branches, mode, time_s, structure=None):
+    """(frames, branches, 2) angles in rad, and what truth.json says of the drive. With a structure branches act back on their parents."""
     said = dict(mode="wind" if mode == "wind" else "release", release_time_s=None, release_frame=None, wind_beta=None,
-                wind_gust_signal=None, flex=FLEX, model=MODEL)
+                wind_gust_signal=None, flex=FLEX, model=structure.MODEL if structure else MODEL)
     if mode == "wind":
-        theta, gust = wind_driven(rng, branches, time_s)
+        theta, gust = wind_driven(rng, branches, time_s, structure)
         return theta, said | dict(wind_beta=GUST_BETA, wind_gust_signal=np.round(gust, 4).tolist())
     release_s = round(rng.uniform(0.8, 1.2), 3) if mode == "held" else 0.0
     frame_s = time_s[1] - time_s[0]
     said.update(release_time_s=release_s, release_frame=round(release_s / frame_s, 3))
+    if structure:
+        return structure.free_decay(np.array([b.pull_rad for b in branches]), time_s, release_s), said
     return free_decay(branches, time_s, release_s), said
 
 
@@ -41,23 +43,32 @@ def free_decay(branches, time_s, release_s):
     return np.stack(out, axis=1)
 
 
-def wind_driven(rng, branches, time_s):
+def wind_driven(rng, branches, time_s, structure=None):
     """Angles under gusts, and the gust signal (mean 0, deviation 1) at the given times."""
     dt = time_s[1] - time_s[0]
     spin_up = int(SPIN_UP_S / dt)
     long_s = np.arange(spin_up + len(time_s)) * dt
     gust = red_noise(rng, len(long_s), dt)
-    out = []
+    drives = []
     for b in branches:
         # The gust meets the branches one after the other, and each has some turbulence of its own.
         delay_s = 0.25 + b.nodes_m[-1, 0] / 12.0
         common = 0.45 + 0.40 * np.interp(long_s - delay_s, long_s, gust)
         own = 0.20 * np.stack([red_noise(rng, len(long_s), dt) for _ in range(2)], axis=1)
-        drive = common[:, None] * b.pull_rad + own * np.linalg.norm(b.pull_rad)
-        w, z = 2 * np.pi * b.freq_hz, b.damping
-        system = ([[0, 1], [-w * w, -2 * z * w]], [[0], [w * w]], [[1, 0]], [[0]])
-        out.append(np.stack([lsim(system, drive[:, k], long_s)[1][spin_up:] for k in range(2)], axis=1))
+        drives.append(common[:, None] * b.pull_rad + own * np.linalg.norm(b.pull_rad))
+    if structure:
+        return structure.driven(np.stack(drives, axis=1), dt)[spin_up:], gust[spin_up:]
+    out = []
+    for b, drive in zip(branches, drives):
+        swings = [oscillator(2 * np.pi * b.freq_hz, b.damping, drive[:, k], dt) for k in range(2)]
+        out.append(np.stack(swings, axis=1)[spin_up:])
     return np.stack(out, axis=1), gust[spin_up:]
+
+
+def oscillator(w, damping, drive, dt):
+    """x of x'' + 2 damping w x' + w^2 (x - drive) = 0 from rest at 0, at steps of dt."""
+    system = ([[0, 1], [-w * w, -2 * damping * w]], [[0], [w * w]], [[1, 0]], [[0]])
+    return lsim(system, drive, np.arange(len(drive)) * dt)[1]
 
 
 def red_noise(rng, count, dt):

@@ -81,6 +81,12 @@ def grow(rng, leafy):
     return kept, pull_direction
 
 
+def raise_frequencies(branches, times):
+    """Of all branches but the trunk."""
+    for b in branches[1:]:
+        b.freq_hz *= times
+
+
 def prune(rng, everything):
     """Keep the larger branches and some of the small ones, none without its parent, and number them."""
     rank = {}
