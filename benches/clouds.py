@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Trees from point clouds against the true ones.
 
-  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--work DIR] [--method paths|colonisation] [--in-leaf] [--keep] [options of made_clouds.py]
+  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--treefiles FILE...] [--work DIR] [--method paths|colonisation] [--in-leaf] [--keep] [options of made_clouds.py]
 
 For each seed: a cloud by made_clouds.py, `arborcam cloud` and `arborcam export --format treefile` on it, and the figures of cloud_score.py:
 
@@ -17,6 +17,8 @@ the figures above, and also:
   trees            found, of N
   right, wrong     share of the points of true trees that are given to the right tree, and to another; the rest is given to none
 
+With --treefiles the tree of seed FIRST_SEED is that of the first file, and so on: trees of another program.
+
 A cloud that gives no tree is counted and named. Claims are made on seeds that nothing was tuned on. Needs numpy and scipy.
 """
 import argparse, json, os, shutil, subprocess, sys, tempfile
@@ -24,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-import cloud_score
+import cloud_score, treefile
 
 HERE = Path(__file__).parent
 SCORED_POINTS = 60_000
@@ -35,12 +37,15 @@ def main():
     parser.add_argument("arborcam")
     parser.add_argument("first", type=int)
     parser.add_argument("last", type=int)
+    parser.add_argument("--treefiles", type=Path, nargs="+", default=[])
     parser.add_argument("--work", type=Path)
     parser.add_argument("--method", default="paths")
     parser.add_argument("--in-leaf", action="store_true", help="clouds with leaves, which arborcam takes off")
     parser.add_argument("--keep", action="store_true", help="keep clouds and trees in the folder --work")
     parser.add_argument("--trees", type=int, default=1)
     args, of_cloud = parser.parse_known_args()
+    if args.treefiles and (args.trees > 1 or len(args.treefiles) != args.last - args.first + 1):
+        parser.error("--treefiles needs one file for each seed, and no --trees")
     of_cloud += ["--leaves"] if args.in_leaf else []
     of_cloud += ["--trees", str(args.trees)]
     how = ["--method", args.method] + (["--in-leaf"] if args.in_leaf else [])
@@ -49,7 +54,8 @@ def main():
     for seed in range(args.first, args.last + 1):
         folder = work / str(seed)
         if not (folder / "truth.json").exists():
-            subprocess.run([sys.executable, HERE / "made_clouds.py", work, str(seed), str(seed), *of_cloud], check=True)
+            foreign = ["--treefile", args.treefiles[seed - args.first]] if args.treefiles else []
+            subprocess.run([sys.executable, HERE / "made_clouds.py", work, str(seed), str(seed), *of_cloud, *foreign], check=True)
         row = (run if args.trees == 1 else run_plot)(args.arborcam, folder, how)
         if row is None:
             failed.append(seed)
@@ -106,11 +112,11 @@ def cloud(arborcam, folder, out, how):
 
 
 def score(arborcam, tree, truth, points):
-    treefile = tree.with_suffix(".txt")
-    treefile.unlink(missing_ok=True)
-    subprocess.run([arborcam, "export", tree, "--format", "treefile", "--out", treefile], check=True, stderr=subprocess.DEVNULL)
+    path = tree.with_suffix(".txt")
+    path.unlink(missing_ok=True)
+    subprocess.run([arborcam, "export", tree, "--format", "treefile", "--out", path], check=True, stderr=subprocess.DEVNULL)
     some = points[np.random.default_rng(0).choice(len(points), min(SCORED_POINTS, len(points)), False)]
-    return cloud_score.score(truth, some, *read_treefile(treefile))
+    return cloud_score.score(truth, some, *treefile.read(path))
 
 
 def read_points(path):
@@ -123,13 +129,6 @@ def read_trees(path):
     raw = path.read_bytes()
     rows = np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], [("at", "<f8", 3), ("tree", "<i4")])
     return rows["tree"]
-
-
-def read_treefile(path):
-    names, line = [text for text in path.read_text().splitlines() if not text.startswith("#")]
-    rows = np.array([[float(cell) for cell in segment.split(",")] for segment in line.split(", ")])
-    column = {name: k for k, name in enumerate(names.split(","))}
-    return rows[:, column["parent_id"]].astype(int), rows[:, [column[a] for a in "xyz"]], rows[:, column["radius"]]
 
 
 if __name__ == "__main__":

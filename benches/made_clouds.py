@@ -2,6 +2,7 @@
 """Point clouds of made-up trees whose true wood is known, as a laser scanner on a few tripods gives them.
 
   made_clouds.py OUT_DIR NAME SEED [--leaves] [--trees N [--apart M]] [--no-ground] [--scanners N] [--step DEG] [--noise MM] [--format ply|xyz]
+                 [--treefile FILE]
 
 Why: a tree from a cloud can be scored only against one that is known. The tree of a seed is the one that made_films.py films
 with the same seed, so that a film can be laid on the scan.
@@ -20,12 +21,15 @@ across. Needs numpy.
 With --trees N several trees, each turned and 0.6 to 1.2 times as large as the one of its seed (SEED, 1000 SEED + 1, ...), stand on one
 plot, no two trunks nearer than --apart: their crowns reach into each other. Then truth.json has a list "trees", each with its foot and
 branches, and scanners stand among them, too.
+
+With --treefile the tree is that of a file of another program (`treecreate` of treetools, say), and SEED only places the scanners.
 """
 import argparse, json
 from pathlib import Path
 
 import numpy as np
 
+import treefile
 from made_films import tree
 
 SCANNER_HEIGHT_M = 1.5
@@ -48,12 +52,14 @@ def main():
     parser.add_argument("--step", type=float, default=0.1, help="between two rays, degrees")
     parser.add_argument("--noise", type=float, help="standard deviation along the ray, mm; 2 to 5 by chance")
     parser.add_argument("--format", choices=["ply", "xyz"], default="ply")
+    parser.add_argument("--treefile", type=Path)
     args = parser.parse_args()
     make(args.out_dir / args.name, args)
 
 
 def make(folder, args):
-    trees = [Standing(tree.grow(np.random.default_rng(args.seed), args.leaves)[0])]
+    grown = tree.grow(np.random.default_rng(args.seed), args.leaves)[0] if args.treefile is None else treefile.branches(args.treefile)
+    trees = [Standing(grown)]
     rng = np.random.default_rng([args.seed, 7])
     noise_m = 1e-3 * (args.noise or rng.uniform(2.0, 5.0))
     scanners = args.scanners or int(rng.integers(3, 5))
