@@ -10,6 +10,10 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Cells of the grid in the height of the cloud.
 const CELLS_IN_HEIGHT: f32 = 40.0;
+/// How often cells are doubled at most, while fewer than half of those that hold a point hold enough.
+const MOST_DOUBLINGS: i32 = 2;
+/// Points that a cell must hold: the lowest two may be echoes from below the ground.
+const LEAST_IN_CELL: usize = 3;
 /// Steepest ground: about 35 degrees.
 const STEEPEST: f32 = 0.7;
 /// A piece is ground if it is so many cells large, and so wide as a share of the cloud's height, to
@@ -51,8 +55,7 @@ impl Ground {
     /// The ground of a cloud whose points are `height` high; `None` where the tree alone was cut
     /// out.
     pub fn of(points: &[Point3<f32>], height: f32) -> Option<Self> {
-        let cell = height / CELLS_IN_HEIGHT;
-        let mut lowest = lowest_of_cells(points, cell);
+        let (cell, mut lowest) = lowest_of_cells(points, height / CELLS_IN_HEIGHT);
         let bottom = lowest.values().map(|p| p.z).fold(f32::INFINITY, f32::min);
         let mut best: Vec<Cell> = Vec::new();
         let mut taken: BTreeSet<Cell> = BTreeSet::new();
@@ -155,22 +158,39 @@ fn cell_at(x: f32, y: f32, cell: f32) -> Cell {
     ((x / cell).floor() as i32, (y / cell).floor() as i32)
 }
 
-/// The lowest point in each cell but two: a scanner has echoes from below the ground.
-fn lowest_of_cells(points: &[Point3<f32>], cell: f32) -> BTreeMap<Cell, Point3<f32>> {
-    let mut three: BTreeMap<Cell, Vec<Point3<f32>>> = BTreeMap::new();
+/// The size of a cell, and the lowest point in each but two. Cells are `least` wide, larger where points are sparse.
+fn lowest_of_cells(points: &[Point3<f32>], least: f32) -> (f32, BTreeMap<Cell, Point3<f32>>) {
+    let mut cell = least;
+    for _ in 0..MOST_DOUBLINGS {
+        let low = low_in_cells(points, cell);
+        let full = low.values().filter(|low| low.len() == LEAST_IN_CELL);
+        if 2 * full.count() >= low.len() {
+            return (cell, highest_of(low));
+        }
+        cell *= 2.0;
+    }
+    (cell, highest_of(low_in_cells(points, cell)))
+}
+
+/// The highest of the lowest points of each cell that holds enough.
+fn highest_of(low: BTreeMap<Cell, Vec<Point3<f32>>>) -> BTreeMap<Cell, Point3<f32>> {
+    low.into_iter()
+        .filter_map(|(cell, low)| Some((cell, *low.get(LEAST_IN_CELL - 1)?)))
+        .collect()
+}
+
+/// The lowest points of each cell, [`LEAST_IN_CELL`] at most, the lowest first.
+fn low_in_cells(points: &[Point3<f32>], cell: f32) -> BTreeMap<Cell, Vec<Point3<f32>>> {
+    let mut low: BTreeMap<Cell, Vec<Point3<f32>>> = BTreeMap::new();
     for at in points {
-        let lowest = three.entry(cell_at(at.x, at.y, cell)).or_default();
-        if lowest.len() < 3 || at.z < lowest[2].z {
+        let lowest = low.entry(cell_at(at.x, at.y, cell)).or_default();
+        if lowest.len() < LEAST_IN_CELL || at.z < lowest[LEAST_IN_CELL - 1].z {
             lowest.push(*at);
             lowest.sort_unstable_by(|a, b| a.z.total_cmp(&b.z));
-            lowest.truncate(3);
+            lowest.truncate(LEAST_IN_CELL);
         }
     }
-    three.retain(|_, lowest| lowest.len() == 3);
-    three
-        .into_iter()
-        .map(|(cell, lowest)| (cell, lowest[2]))
-        .collect()
+    low
 }
 
 /// How far the lowest points lie off planes through those about them, cells. `None` where nothing lies about
@@ -259,6 +279,32 @@ mod tests {
         let mut alone = rough;
         alone.retain(|p| p.z < 1.0 || p.z > 3.0);
         assert!(Ground::of(&alone, 4.0).is_some());
+    }
+
+    /// Twenty points per square metre, spread evenly (Halton), as of a scan that was thinned.
+    #[test]
+    fn sparse_ground_is_found_in_larger_cells() {
+        let mut points = vec![Point3::new(0.0, 0.0, 5.0)];
+        for i in 1..720 {
+            let (x, y) = (
+                6.0 * radical_inverse(i, 2) - 3.0,
+                6.0 * radical_inverse(i, 3) - 3.0,
+            );
+            points.push(Point3::new(x, y, slope(x, y)));
+        }
+        let ground = Ground::of(&points, 5.0).expect("ground");
+        assert!((ground.height_at(1.0, 1.0) - slope(1.0, 1.0)).abs() < 0.15);
+    }
+
+    /// Number of a Halton sequence in 0 to 1.
+    fn radical_inverse(mut i: u32, base: u32) -> f32 {
+        let (mut part, mut sum) = (1.0, 0.0);
+        while i > 0 {
+            part /= base as f32;
+            sum += part * (i % base) as f32;
+            i /= base;
+        }
+        sum
     }
 
     /// A slope with a stem on it, and the stem alone.

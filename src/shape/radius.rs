@@ -96,8 +96,11 @@ pub(super) fn as_seen(grown: &mut [Grown], skeleton: &Skeleton) {
                     Some(_) => node.radius,
                     None => node.radius.min(tip_px(skeleton)),
                 };
-                let parent = node.parent.filter(|p| p.index() > 0).map(|p| p.index());
-                let below = parent.map_or(node.radius, |p| skeleton.nodes[p].radius);
+                let parent = node.parent.map(|p| p.index());
+                let below = parent
+                    .map(|p| skeleton.nodes[p].radius)
+                    .filter(|radius| *radius > 0.0)
+                    .unwrap_or(node.radius);
                 let leaves = parent.is_some_and(|p| goes_on[p] != Some(limb.node));
                 // One that leaves another has its own radius in its middle.
                 let from = if leaves {
@@ -298,7 +301,7 @@ mod tests {
     use crate::model::{Node, Size};
     use crate::shape::limbs;
 
-    /// A trunk of 8 px, a limb of 6 px in which it goes on, what goes on unseen in that, and a traced
+    /// A trunk of 9 to 8 px, a limb of 6 px in which it goes on, what goes on unseen in that, and a traced
     /// branch of 5 px that ends.
     fn traced() -> Skeleton {
         let node = |name: u32, parent: u32, at: [f64; 3], radius: f64, kind: NodeKind| Node {
@@ -309,7 +312,10 @@ mod tests {
         };
         Skeleton {
             nodes: vec![
-                Node::made_up(0, None, [0.0; 3]),
+                Node {
+                    radius: 9.0,
+                    ..Node::made_up(0, None, [0.0; 3])
+                },
                 node(1, 0, [0.0, 100.0, 0.0], 8.0, NodeKind::Traced),
                 node(2, 1, [0.0, 150.0, 0.0], 6.0, NodeKind::Traced),
                 node(3, 2, [10.0, 250.0, 0.0], 1.0, NodeKind::Measured),
@@ -332,6 +338,9 @@ mod tests {
             let samples = &limb.expect("a limb").samples;
             samples.iter().map(|sample| sample.radius).collect()
         };
+        let trunk = radii(1);
+        assert!((trunk[0] - 9.0).abs() < 1e-9, "{trunk:?}");
+        assert!((trunk[trunk.len() - 1] - 8.0).abs() < 1e-9, "{trunk:?}");
         let unseen = radii(3);
         assert!((unseen[0] - 6.0).abs() < 1e-9, "{unseen:?}");
         let steps = unseen.windows(2).map(|r| r[0] - r[1]);
