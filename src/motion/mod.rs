@@ -16,7 +16,7 @@ mod spread;
 
 pub use between::between;
 pub use binding::Binding;
-pub use deterministic::direction as deterministic_direction;
+pub use deterministic::{SightLine, direction as deterministic_direction};
 pub use flutter::flutter;
 pub use local::{Nearby, depth};
 pub use probabilistic::Problem;
@@ -229,6 +229,7 @@ impl PoseEstimator {
         let out_of_reach_px = target.map_or(0.0, |t| {
             (distance(&t, &base.position.xy()) - branch.length).max(0.0)
         });
+        let sigma_track_px = self.settings.sigma_track_px.hypot(out_of_reach_px);
         match self.settings.method {
             MotionMethod::Probabilistic => Problem {
                 parent_rotation: base.rotation,
@@ -241,7 +242,7 @@ impl PoseEstimator {
                 parent_direction: branch.parent_direction,
                 rest_direction: branch.direction,
                 previous_direction: previous.unwrap_or(branch.direction),
-                sigma_track_px: self.settings.sigma_track_px.hypot(out_of_reach_px),
+                sigma_track_px,
                 sigma_shape: branch.sigma_shape,
                 // The first frame has none before it.
                 sigma_depth: previous
@@ -258,7 +259,12 @@ impl PoseEstimator {
                 let own = previous.unwrap_or(branch.direction);
                 let Some(target) = target else { return own };
                 let now = base.position + base.rotation * own.into_inner() * branch.length;
-                let d = deterministic_direction(&base.position, branch.length, &now, target);
+                let seen = SightLine {
+                    target_px: target,
+                    sd_px: sigma_track_px,
+                    depth: seen.depth,
+                };
+                let d = deterministic_direction(&base.position, branch.length, &now, seen);
                 Unit::new_normalize(base.rotation.inverse() * d.into_inner())
             }
         }

@@ -7,7 +7,7 @@ use arborcam::model::TrackTable;
 use arborcam::model::{
     Cluster, ClusterId, Foot, MotionHierarchy, Outline, Size, Skeleton, TrackId,
 };
-use arborcam::motion::{PoseEstimator, Problem, deterministic_direction};
+use arborcam::motion::{PoseEstimator, Problem, SightLine, deterministic_direction};
 use arborcam::shape::{self, Envelope, Terms};
 use arborcam::skeleton::{self, Node2d};
 use nalgebra::{Point2, Point3, Rotation3, Unit, UnitQuaternion, Vector2, Vector3, distance};
@@ -473,7 +473,12 @@ fn a_target_out_of_reach_is_shifted_until_the_branch_reaches_it() {
         Point2::new(10.0, 20.0),
         Point2::new(60.0, 20.0),
     ] {
-        let d = deterministic_direction(&root, 50.0, &now, target);
+        let seen = SightLine {
+            target_px: target,
+            sd_px: 1.0,
+            depth: None,
+        };
+        let d = deterministic_direction(&root, 50.0, &now, seen);
         let end = root + d.into_inner() * 50.0;
         let wanted = target - root.xy();
         let off = distance(&end.xy(), &target);
