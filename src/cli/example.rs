@@ -105,8 +105,8 @@ pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
     let bare = tree.without_interval();
     if bare > 0 {
         eprint_line(&format!(
-            "arborcam: warning: {}: the frequencies of {bare} pieces are left out: they are not above 0, or not \
-             within an interval (frequency_lo_hz, frequency_hi_hz)",
+            "arborcam: warning: {}: the frequencies of {bare} pieces are left out: they are not above 0, not \
+             within an interval (frequency_lo_hz, frequency_hi_hz), or such as no branch has",
             path.display()
         ));
     }
@@ -114,6 +114,14 @@ pub fn say_what_is_lost(path: &Path, tree: &ModelTree) {
     if thin > 0 && thin < all {
         eprint_line(&format!(
             "arborcam: warning: {}: {thin} of {all} pieces have no radius above 0, and no radius of it counts",
+            path.display()
+        ));
+    }
+    let apart = tree.begin_apart();
+    if apart > 0 {
+        eprint_line(&format!(
+            "arborcam: warning: {}: {apart} of {all} pieces begin far from the one that they grow from, and are drawn \
+             from its end; check their parents",
             path.display()
         ));
     }

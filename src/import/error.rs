@@ -53,6 +53,11 @@ pub enum ImportError {
     NoHeight,
     #[error("pieces of it have no radius; give a table with all radii")]
     NoRadius,
+    #[error(
+        "a piece of it has a radius of {thickest:.3}, and all of it is {height:.3} high; give radii in the unit of the \
+         places"
+    )]
+    TooThick { thickest: f64, height: f64 },
     #[error("it has {found} {what}, and at most {most} are read; simplify it")]
     TooMany {
         found: usize,

@@ -37,8 +37,10 @@ pub struct Wood {
     /// In the unit of the file; 0 where it is not known.
     pub radius: f64,
     pub sway: Option<Sway>,
-    /// The file gives a frequency that is not above 0 and within its interval; it is ignored.
+    /// The file gives a frequency that is not above 0 and within its interval, or that no branch has; it is ignored.
     pub lacks_interval: bool,
+    /// The file says that it begins elsewhere than at what it grows from.
+    pub begins_apart: bool,
     /// The file says that nobody has seen it: a copy, a twig, or what a generator made up.
     pub is_made_up: bool,
 }
@@ -135,10 +137,28 @@ impl ModelTree {
         self.pieces().filter(|wood| wood.is_made_up).count()
     }
 
-    /// Pieces with a frequency that is ignored, since it is not above 0 and within an interval.
+    /// Pieces with a frequency that is ignored ([`Wood::lacks_interval`]).
     pub fn without_interval(&self) -> usize {
         let pieces = self.pieces();
         pieces.filter(|wood| wood.lacks_interval).count()
+    }
+
+    /// Refuses wood that is as thick as the tree is high: its radii are in another unit.
+    ///
+    /// # Errors
+    /// There is some, or the tree has no height.
+    pub fn refuse_thick(&self) -> Result<(), ImportError> {
+        let height = self.height()?;
+        let thickest = self.pieces().map(|wood| wood.radius).fold(0.0, f64::max);
+        match 2.0 * thickest < height {
+            true => Ok(()),
+            false => Err(ImportError::TooThick { thickest, height }),
+        }
+    }
+
+    /// Pieces that begin far from the end of the one that they grow from.
+    pub fn begin_apart(&self) -> usize {
+        self.pieces().filter(|wood| wood.begins_apart).count()
     }
 
     /// Pieces without a radius above 0.
@@ -243,6 +263,7 @@ impl Edges {
             }
             known.sway = known.sway.or(own.sway);
             known.lacks_interval |= own.lacks_interval;
+            known.begins_apart |= own.begins_apart;
             known.is_made_up |= own.is_made_up;
         }
         wood

@@ -4,7 +4,7 @@
 use super::error::ImportError;
 use super::model_tree::{Edges, MOST_PLACES, Wood};
 use super::sketch::refuse_more;
-use crate::model::{Excitation, SwayColumns};
+use crate::model::{Excitation, Sway, SwayColumns};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 
@@ -28,6 +28,16 @@ pub(super) struct Segment {
 const FARTHEST: f64 = 1e11;
 const THICKEST: f64 = 1e6;
 
+/// As a share of the height of all, beyond the length and the thickness of a carrier.
+const APART: f64 = 0.05;
+/// No branch sways faster.
+const FASTEST_HZ: f64 = 100.0;
+
+/// Whether it swings at all: beyond 1 it creeps back.
+fn is_damped(sway: &Sway) -> bool {
+    sway.damping_ratio.is_none_or(|damping| damping.value < 1.0)
+}
+
 /// Whether its place and its radius may be those of a piece of a tree.
 fn is_plausible(own: &Segment) -> bool {
     let places = own.start.iter().chain([&own.end]);
@@ -46,6 +56,7 @@ pub(super) fn id(cell: f64) -> Option<i64> {
 pub(super) fn wood(radius: f64, sway: [f64; 6], made_up: f64) -> Wood {
     let columns = SwayColumns::of_values(sway);
     let sway = columns.sway(Excitation::Wind, f64::NAN);
+    let sway = sway.filter(|sway| sway.frequency_hz.value <= FASTEST_HZ && is_damped(sway));
     Wood {
         radius: if radius.is_finite() {
             radius.max(0.0)
@@ -54,6 +65,7 @@ pub(super) fn wood(radius: f64, sway: [f64; 6], made_up: f64) -> Wood {
         },
         sway,
         lacks_interval: sway.is_none() && columns.frequency_hz.is_finite(),
+        begins_apart: false,
         is_made_up: made_up > 0.0,
     }
 }
@@ -106,7 +118,29 @@ pub(super) fn edges(mut segments: Vec<Segment>) -> Result<Edges, ImportError> {
             "piece {id} grows from itself by way of its parents"
         )));
     }
+    let height = height(&segments);
+    for number in 0..segments.len() {
+        let parent = parents[number].map(|parent| segments[parent]);
+        segments[number].wood.begins_apart =
+            parent.is_some_and(|parent| is_apart(&segments[number], &parent, height));
+    }
     Ok(joined(&segments, &parents))
+}
+
+/// Of all ends, y up.
+fn height(segments: &[Segment]) -> f64 {
+    let ends = segments.iter().map(|own| own.end.y);
+    let highest = ends.clone().fold(f64::NEG_INFINITY, f64::max);
+    highest - ends.fold(f64::INFINITY, f64::min)
+}
+
+/// Whether a piece begins elsewhere than on the one that it grows from, or near to that.
+fn is_apart(own: &Segment, parent: &Segment, height: f64) -> bool {
+    let Some(start) = own.start else {
+        return false;
+    };
+    let length = parent.start.map_or(0.0, |from| (parent.end - from).norm());
+    (start - parent.end).norm() > length + 2.0 * parent.wood.radius + APART * height
 }
 
 /// The edges of pieces that grow from those with these numbers.
@@ -188,6 +222,32 @@ mod tests {
         for order in [[3, 2, 1, 0], [2, 0, 3, 1], [1, 3, 0, 2]] {
             let segments = order.map(|i| fork()[i]).to_vec();
             assert_eq!(edges(segments).as_ref(), Ok(&in_order), "{order:?}");
+        }
+    }
+
+    #[test]
+    fn a_piece_that_begins_far_from_its_carrier_is_marked() {
+        let mut segments = fork();
+        for (own, start) in segments.iter_mut().zip([0.0, 1.0, 2.0, 1.2]) {
+            own.start = Some(Point3::new(0.0, start, 0.0));
+        }
+        let sound = edges(segments.clone()).expect("sound");
+        assert!(sound.wood.iter().all(|wood| !wood.begins_apart));
+        segments[3].start = Some(Point3::new(-3.0, 3.0, 0.0));
+        let marked = edges(segments).expect("sound");
+        assert!(marked.wood[4].begins_apart && !marked.wood[3].begins_apart);
+    }
+
+    #[test]
+    fn a_sway_that_no_branch_has_does_not_count() {
+        let sound = wood(0.1, [1.5, 1.4, 1.6, 0.03, 0.02, 0.04], 0.0);
+        assert!(sound.sway.is_some() && !sound.lacks_interval);
+        for sway in [
+            [1e9, 9e8, 2e9, 0.03, 0.02, 0.04],
+            [1.5, 1.4, 1.6, 5.0, 4.0, 6.0],
+        ] {
+            let bad = wood(0.1, sway, 0.0);
+            assert!(bad.sway.is_none() && bad.lacks_interval, "{sway:?}");
         }
     }
 

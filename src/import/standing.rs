@@ -86,6 +86,7 @@ struct Forks {
 impl Forks {
     fn of(model: &ModelTree) -> Result<Self, ImportError> {
         model.refuse_deep(&[])?;
+        model.refuse_thick()?;
         let children = model.children();
         let mut forks = Self {
             of_model: Vec::new(),

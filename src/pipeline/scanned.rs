@@ -54,7 +54,8 @@ pub fn stand_scanned(tree: &CloudTree) -> ScaledTree {
 /// that of its middle, and that of a node a mean of what ends there and the thickest that goes on.
 ///
 /// # Errors
-/// A radius is not known, it has no height or is far wider than high, or too many forks on one way.
+/// A radius is not known, or as large as the tree, it has no height or is far wider than high, or too many forks on one
+/// way.
 pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, ImportError> {
     let figures = CloudFigures {
         height_m: metres_per_unit * model.height()?,
@@ -62,6 +63,7 @@ pub fn as_scanned(model: &ModelTree, metres_per_unit: f64) -> Result<CloudTree, 
     };
     let sway_changes = model.sway_changes();
     model.refuse_deep(&sway_changes)?;
+    model.refuse_thick()?;
     if model.without_radius() > 0 {
         return Err(ImportError::NoRadius);
     }
@@ -221,6 +223,12 @@ mod tests {
 
     #[test]
     fn a_table_that_no_picture_could_hold_is_refused() {
+        let mut thick = comb(10, 0.1);
+        thick.nodes[3].wood.radius *= 1e3;
+        assert!(matches!(
+            as_scanned(&thick, 1.0),
+            Err(ImportError::TooThick { .. })
+        ));
         let tree = as_scanned(&comb(200, 0.1), 0.5).expect("a tree");
         assert!((tree.figures.height_m - 10.0).abs() < 1e-9);
         assert_eq!(tree.nodes.len(), 401);

@@ -81,21 +81,29 @@ pub fn sway_on_scan(
             }
         }
     }
-    let mut filmed: BTreeMap<usize, Vec<FilmedBranch>> = BTreeMap::new();
+    let (mut trunks, mut filmed) = (Vec::new(), BTreeMap::<usize, Vec<FilmedBranch>>::new());
     for node in film.skeleton.measured_branches() {
+        let line = line(&film.skeleton, node, |at| at.xy());
+        let own = FilmedBranch { node, line };
+        if begins_at_foot(&film.skeleton, node) {
+            trunks.push(own.clone());
+        }
         if let Some(branch) = votes[node.index()].branch(&names) {
-            let line = line(&film.skeleton, node, |at| at.xy());
-            filmed
-                .entry(branch)
-                .or_default()
-                .push(FilmedBranch { node, line });
+            filmed.entry(branch).or_default().push(own);
         }
     }
     let mut sway = vec![Err(Unidentified::NotMeasured); scan.nodes.len()];
     for piece in scan.measured_branches() {
         let own = line(scan, piece, |at| seen.project(at));
-        let on_it = filmed.get(&names.of(piece)).into_iter().flatten();
-        let offs = on_it.map(|f| (f.node, mean_off(&own, &f.line, ACROSS_SHARE * height_px)));
+        // Most points of all may be on a bough in which the filmed trunk goes on.
+        let on_it = match begins_at_foot(scan, piece) {
+            true => Some(&trunks),
+            false => filmed.get(&names.of(piece)),
+        };
+        let offs = on_it
+            .into_iter()
+            .flatten()
+            .map(|f| (f.node, mean_off(&own, &f.line, ACROSS_SHARE * height_px)));
         let nearest = offs.min_by(|a, b| a.1.total_cmp(&b.1));
         let lies = nearest.filter(|(_, off)| *off <= FARTHEST_SHARE * height_px);
         let filmed = lies.and_then(|(node, _)| film.sway.get(node.index()));
@@ -106,7 +114,14 @@ pub fn sway_on_scan(
     sway
 }
 
+/// Whether the branch that ends in a node begins at the foot.
+fn begins_at_foot(skeleton: &Skeleton, node: NodeId) -> bool {
+    let begin = skeleton.begin(node);
+    begin.is_some_and(|begin| skeleton.nodes[begin.index()].parent.is_none())
+}
+
 /// A branch of the film that is known in the scan.
+#[derive(Clone)]
 struct FilmedBranch {
     node: NodeId,
     line: Vec<LinePlace>,

@@ -1,7 +1,7 @@
 //! `arborcam cloud`: a tree from a point cloud, its tables, and what bad clouds get.
 
 use crate::chance::Chance;
-use crate::support::names_in;
+use crate::support::{names_in, replayed};
 use crate::to_folder::{BAD_USAGE, FAILED, NO_INPUT, arborcam, done, records};
 use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
@@ -706,6 +706,89 @@ fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
             "{said}"
         );
         assert!(!none.exists());
+    }
+}
+
+/// A film on a table of its own tree, in metres: it is found, the trunk has the film's frequency from the foot on, and so
+/// nearly every piece hangs on wood with one.
+#[test]
+fn a_film_on_the_wood_of_its_own_tree_gives_it_its_frequencies() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let [table, scan, swaying, back] =
+        ["tree.csv", "scan", "swaying", "back.csv"].map(|name| dir.path().join(name));
+    let film = replayed().to_str().expect("name");
+    let name = table.to_str().expect("name");
+    done(
+        &["export", film, "--format", "qsm", "--height", "4"],
+        &table,
+    );
+    let said = done(&["cloud", name, "--film", film, "--unit", "m"], &swaying);
+    assert!(said.contains("the film lies on the scan within"), "{said}");
+    let note = fs::read(swaying.join("capture.json")).expect("capture.json");
+    let note: serde_json::Value = serde_json::from_slice(&note).expect("JSON");
+    let off = note["scan"]["film"]["off_hi"].as_f64().expect("off");
+    assert!(off < 0.02, "{off}");
+    let trunk = records(&Path::new(film).join("nodes.csv"))
+        .into_iter()
+        .find(|node| !node["frequency_hz"].is_empty())
+        .expect("the trunk's frequency");
+    let swaying_name = swaying.to_str().expect("name");
+    done(&["export", swaying_name, "--format", "qsm"], &back);
+    let pieces = records(&back);
+    let on_trunk: f64 = pieces[0]["frequency_hz"].parse().expect("a number");
+    let filmed: f64 = trunk["frequency_hz"].parse().expect("a number");
+    assert!((on_trunk - filmed).abs() < 1e-4, "{on_trunk}, {filmed}");
+    assert!(pieces.iter().all(|p| !p["nearest_frequency_hz"].is_empty()));
+    // One that lies elsewhere is refused.
+    let pairs = dir.path().join("pairs.csv");
+    fs::write(&pairs, "u_px,v_px,x,y,z\n0,0,0,0,0\n").expect("pairs");
+    let pairs = pairs.to_str().expect("name");
+    let few = arborcam(&["cloud", name, "--film", film, "--pairs", pairs], &scan);
+    let said = String::from_utf8_lossy(&few.stderr).into_owned();
+    assert_eq!(few.status.code(), Some(BAD_USAGE), "{said}");
+    assert!(
+        said.contains("three are needed") && !scan.exists(),
+        "{said}"
+    );
+}
+
+/// Tables that contradict themselves, or hold what no tree has.
+#[test]
+fn tables_that_cannot_be_true_are_refused_or_named() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let head = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius,frequency_hz,frequency_lo_hz,frequency_hi_hz";
+    let sound = [
+        "0,-1,0,0,0,0,0,2,0.1,1,0.9,1.1",
+        "1,0,0,0,2,0,0,4,0.08,,,",
+        "2,1,0,0,4,1,0,5,0.05,,,",
+    ];
+    for (number, (from, to, succeeds, expected)) in [
+        ("0,0,4,1,0,5", "0,0,4,1,0,5", true, "a tree of 1 branch"),
+        (
+            "0,0,4,1,0,5",
+            "9,0,4,1,0,5",
+            true,
+            "1 of 3 pieces begin far from",
+        ),
+        (
+            "1,0.9,1.1",
+            "1e9,9e8,2e9",
+            true,
+            "frequencies of 1 pieces are left out",
+        ),
+        ("0.1,1,", "100,1,", false, "radii in the unit of the places"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let file = dir.path().join(format!("{number}.csv"));
+        let text = format!("{head}\n{}\n", sound.join("\n")).replacen(from, to, 1);
+        fs::write(&file, text).expect("table");
+        let name = file.to_str().expect("name");
+        let output = arborcam(&["cloud", name, "--unit", "m"], &file.with_extension("out"));
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.success(), succeeds, "{said}");
+        assert!(said.contains(expected), "{said} lacks {expected}");
     }
 }
 
