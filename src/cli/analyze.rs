@@ -34,6 +34,8 @@ use written::{with_amplitudes, write_file};
 const MAX_PART_S: f64 = 600.0;
 /// Points that end so long before the film were cut off, s.
 const LEAST_CUT_S: f64 = 1.0;
+/// A marker that was seen in less than this share of the frames is named.
+const SELDOM_SEEN: f64 = 0.5;
 
 /// The analysis of one capture.
 struct CaptureAnalysis {
@@ -208,6 +210,9 @@ fn analyse_capture(
     let marked = marked_tree(args, document, &config)?;
     if let Some(unsure) = marked.as_ref().and_then(unsure_parents) {
         notes.add("note", unsure);
+    }
+    if let Some(lost) = marked.as_ref().and_then(often_lost) {
+        notes.add("warning", lost);
     }
     if args
         .marker_parents()
@@ -390,6 +395,23 @@ fn marked_tree(
     let longest_s = longest_s(args, config);
     let marked = document.marked_tree(args.marker_parents(), longest_s, args.within_s())?;
     Ok(Some(marked))
+}
+
+/// What is to be said of markers that were not seen for much of the film.
+fn often_lost(marked: &MarkedTree) -> Option<String> {
+    let seldom = marked.seldom_seen(SELDOM_SEEN);
+    let each: Vec<String> = seldom
+        .iter()
+        .map(|marker| format!("{} in {}", marker.name, marker.seen))
+        .collect();
+    (!each.is_empty()).then(|| {
+        format!(
+            "of {} frames markers were seen in few ({}), and what they and those on them say is of those frames \
+             alone; correct their places in markers.json and replay the film",
+            marked.film.times_s.len(),
+            each.join(", ")
+        )
+    })
 }
 
 /// What is to be said of markers whose parents follow from the motion, but not for certain.

@@ -121,7 +121,7 @@ impl MarkerFile {
     /// It cannot be read, is of another form, or names no marker.
     pub fn read(path: &str) -> Result<Self, String> {
         let bytes = read_bounded(Path::new(path), LARGEST_NOTE)
-            .map_err(|e| format!("{e}; give a file, or auto"))?;
+            .map_err(|e| format!("{e}; give a file of markers"))?;
         Self::of_json(&bytes)
     }
 

@@ -53,12 +53,6 @@ pub(super) fn check(
             windows.len()
         )));
     }
-    let names: BTreeSet<&str> = windows.iter().map(|w| w.name.as_str()).collect();
-    if names.len() < windows.len() || names.contains("") {
-        return Err(refused(
-            "markers must have names, each a name of its own".into(),
-        ));
-    }
     windows.iter().try_for_each(check_window)?;
     check_marker_parents(windows)?;
     if corrections.len() > MAX_CORRECTIONS {
@@ -68,7 +62,7 @@ pub(super) fn check(
     }
     for correction in corrections {
         let name = &correction.marker;
-        if !names.contains(name.as_str()) {
+        if !windows.iter().any(|window| window.name == *name) {
             return Err(refused(format!(
                 "a correction is for marker {name}, which there is not"
             )));
@@ -95,11 +89,17 @@ fn check_window(window: &MarkerWindow) -> Result<(), ConfigError> {
     )))
 }
 
-/// Checks that the parents of markers are markers, and lead to the foot.
+/// Checks that markers have names of their own, and that their parents are markers and lead to the foot.
 ///
 /// # Errors
-/// One is none, or they form a ring.
+/// A name is empty or there twice, a parent is no marker, or they form a ring.
 pub fn check_marker_parents(windows: &[MarkerWindow]) -> Result<(), ConfigError> {
+    let names: BTreeSet<&str> = windows.iter().map(|w| w.name.as_str()).collect();
+    if names.len() < windows.len() || names.contains("") {
+        return Err(refused(
+            "markers must have names, each a name of its own".into(),
+        ));
+    }
     for window in windows {
         check_parents(window, windows)?;
     }
@@ -185,5 +185,7 @@ mod tests {
             assert!(why.contains(expected), "{why:?} lacks {expected:?}");
         }
         assert_eq!(why(&tree, &[at("B", 4.0)]), "");
+        let twice = [window("A", None), window("A", None)];
+        assert!(check_marker_parents(&twice).is_err());
     }
 }

@@ -14,6 +14,12 @@ pub enum DocumentError {
     SeveralTrees { dir: PathBuf, one: PathBuf },
     #[error("{} is no capture: there is no capture.json in it; give a folder that `--out` has made", .dir.display())]
     NotACapture { dir: PathBuf },
+    #[error(
+        "{} is no capture but a file; give the folder that `--out` has made (a file of an option follows `=`, as in \
+         --markers=FILE)",
+        .path.display()
+    )]
+    AFile { path: PathBuf },
     /// A table without which there is nothing to show.
     #[error("{} lacks {file}; copy the capture with all its files, or make it anew", .dir.display())]
     Missing { dir: PathBuf, file: &'static str },
@@ -49,6 +55,9 @@ impl DocumentError {
         let dir = path.to_owned();
         if !path.exists() {
             return Self::NotThere { dir };
+        }
+        if path.is_file() {
+            return Self::AFile { path: dir };
         }
         let inside = std::fs::read_dir(path).into_iter().flatten().flatten();
         let trees = inside

@@ -36,6 +36,14 @@ pub struct MarkedTree {
     depths: MarkerDepths,
 }
 
+/// A marker that was seen in few frames.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SeldomSeen {
+    pub name: String,
+    /// In so many frames.
+    pub seen: usize,
+}
+
 /// A marker that was seen.
 struct Seen<'a> {
     /// Its place among the capture's markers.
@@ -164,7 +172,8 @@ impl Document {
         points: &PointsRead,
     ) -> MarkedTree {
         let foot_px = self.skeleton.foot_px;
-        let mut depths = MarkerDepths::before(self.note.depth.as_ref(), self.skeleton.image_size);
+        let size = self.skeleton.image_size;
+        let mut depths = MarkerDepths::before(self.note.depth.as_ref(), points.has_depth, size);
         let mut nodes = vec![node(NodeName(0), None, 0, Point3::origin())];
         let mut node_of: BTreeMap<usize, NodeId> = BTreeMap::new();
         let mut names = BTreeMap::new();
@@ -192,7 +201,7 @@ impl Document {
         let skeleton = Skeleton {
             nodes,
             foot_px,
-            image_size: self.skeleton.image_size,
+            image_size: size,
         };
         let node_of_marker: BTreeMap<TrackId, NodeId> = node_of
             .iter()
@@ -211,6 +220,25 @@ impl Document {
 }
 
 impl MarkedTree {
+    /// The markers that were seen in less than this share of the frames, by name, each with how many.
+    pub fn seldom_seen(&self, share: f64) -> Vec<SeldomSeen> {
+        let frames = self.film.times_s.len();
+        let mut seldom = Vec::new();
+        for track in &self.film.tracks {
+            let seen = track.at_px.iter().filter(|at| at.x.is_finite()).count();
+            let name = self
+                .names
+                .get(&self.skeleton.nodes[track.node.index()].name);
+            if let Some(name) = name.filter(|_| (seen as f64) < share * frames as f64) {
+                seldom.push(SeldomSeen {
+                    name: name.clone(),
+                    seen,
+                });
+            }
+        }
+        seldom
+    }
+
     /// The poses of the tree in the frames of a part of its film, of which `skeleton` is where it rests: each
     /// node is where its marker is, and nowhere while that is not seen. In a film with depth it is nowhere
     /// in space (its z is no number) while its depth is not seen; without depth all is in the picture's plane.
@@ -345,7 +373,7 @@ mod tests {
                 depth_m,
             });
         }
-        let mut depths = MarkerDepths::before(Some(&note), image_size);
+        let mut depths = MarkerDepths::before(Some(&note), true, image_size);
         depths.add(NodeId(1), seen);
         let skeleton = Skeleton {
             nodes: vec![

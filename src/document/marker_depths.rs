@@ -21,6 +21,9 @@ const LEAST_SD: f64 = 0.003;
 /// plane.
 #[derive(Clone, Debug)]
 pub(super) struct MarkerDepths {
+    /// The film has depth; else all is in the picture's plane.
+    has_depth: bool,
+    /// `None` where the depth of the foot is not known: then nothing is known of a place in space.
     foot: Option<FootSeen>,
     of_node: BTreeMap<NodeId, DepthWay>,
 }
@@ -51,10 +54,11 @@ struct DepthWay {
 }
 
 impl MarkerDepths {
-    /// Of no marker yet, before the camera that has seen what `note` says.
-    pub fn before(note: Option<&DepthNote>, size: Size) -> Self {
+    /// Of no marker yet, before the camera that has seen what `note` says, of a film with or without depth.
+    pub fn before(note: Option<&DepthNote>, has_depth: bool, size: Size) -> Self {
         let foot = note.filter(|note| note.metres_per_px > 0.0);
         Self {
+            has_depth: has_depth || foot.is_some(),
             foot: foot.map(|note| FootSeen {
                 depth_m: note.foot_m,
                 metres_per_px: note.metres_per_px,
@@ -83,7 +87,7 @@ impl MarkerDepths {
     /// without depth, and `None` where only that of this marker was never seen.
     pub fn rest_z_px(&self, node: NodeId) -> Option<f64> {
         match self.foot {
-            None => Some(0.0),
+            None => (!self.has_depth).then_some(0.0),
             Some(foot) => Some(foot.z_px(self.of_node.get(&node)?.rest_m)),
         }
     }
@@ -91,6 +95,7 @@ impl MarkerDepths {
     /// Where it is at a time; no number where that was not seen.
     pub fn z_px(&self, node: NodeId, time_s: f64) -> f64 {
         match self.foot {
+            None if self.has_depth => f64::NAN,
             None => 0.0,
             Some(foot) => self.at(node, time_s).map_or(f64::NAN, |m| foot.z_px(m)),
         }
@@ -202,7 +207,7 @@ mod tests {
     #[test]
     fn what_comes_nearer_has_not_moved_across() {
         let size = Size::new(641, 481);
-        let mut depths = MarkerDepths::before(Some(&camera()), size);
+        let mut depths = MarkerDepths::before(Some(&camera()), true, size);
         let depths_m = [2.0, 1.9, 2.1];
         depths.add(MARKER, seen(&depths_m));
         assert_eq!(depths.rest_z_px(MARKER), Some(0.0));
@@ -222,11 +227,14 @@ mod tests {
     #[test]
     fn a_depth_that_was_not_seen_is_no_number_and_without_a_camera_all_is_flat() {
         let size = Size::new(640, 480);
-        let mut depths = MarkerDepths::before(Some(&camera()), size);
+        let mut depths = MarkerDepths::before(Some(&camera()), true, size);
         depths.add(MARKER, seen(&[2.0]));
         assert!(depths.z_px(MARKER, 0.5).is_nan() && depths.z_px(NodeId(2), 0.0).is_nan());
         assert_eq!(depths.rest_z_px(NodeId(2)), None);
-        let mut flat = MarkerDepths::before(None, size);
+        let mut unknown = MarkerDepths::before(None, true, size);
+        unknown.add(MARKER, seen(&[2.0]));
+        assert!(unknown.z_px(MARKER, 0.0).is_nan() && unknown.rest_z_px(MARKER).is_none());
+        let mut flat = MarkerDepths::before(None, false, size);
         flat.add(MARKER, seen(&[2.0]));
         assert_eq!(
             (flat.rest_z_px(MARKER), flat.z_px(MARKER, 0.5)),

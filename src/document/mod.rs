@@ -37,7 +37,7 @@ pub use forest::{
     FOREST_FILE, FOREST_TREES_FILE, ForestDocument, ForestFileBytes, ForestNote, ForestOrigin,
     GROUND_FILE, GroundNote, MOST_GROUND_SAMPLES,
 };
-pub use marked::MarkedTree;
+pub use marked::{MarkedTree, SeldomSeen};
 pub use modes::{MODES_FILE, modes};
 pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};

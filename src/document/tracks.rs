@@ -196,6 +196,8 @@ pub(super) struct DepthAt {
 pub(super) struct PointsRead {
     log: TrackLog,
     node_of: BTreeMap<TrackId, NodeId>,
+    /// The film has depth, whether any was seen or not.
+    pub has_depth: bool,
 }
 
 impl PointsRead {
@@ -262,6 +264,7 @@ pub(super) fn read_points(
     if dir.join(LEFT_OUT_FILE).exists() {
         tables.push(TracksReader::open(dir, LEFT_OUT_FILE, &by_name)?);
     }
+    let has_depth = tables.iter().any(|table| table.depth.depth_m.is_some());
     let mut camera = CameraReader::open(dir, skeleton.image_size)?;
     let mut node_of: BTreeMap<TrackId, NodeId> = BTreeMap::new();
     let mut log = TrackLog::new(window_s);
@@ -287,7 +290,11 @@ pub(super) fn read_points(
         }
         push(&mut log, time_s, observations);
     }
-    Ok(PointsRead { log, node_of })
+    Ok(PointsRead {
+        log,
+        node_of,
+        has_depth,
+    })
 }
 
 /// Reads a table of points row by row.

@@ -61,7 +61,7 @@ pub struct HalfPower {
 impl Spectrum {
     /// Of the largest peak within `frequencies_hz`. The width of a short film's bin comes on top of
     /// the tree's, so that it errs to the high side. `None` where there is no peak, or one that
-    /// does not come down.
+    /// does not come down, or is so wide that nothing swings.
     pub fn half_power(&self, frequencies_hz: Bounds) -> Option<HalfPower> {
         let a = &self.amplitude;
         let last = ((frequencies_hz.hi / self.bin_hz) as usize).min(a.len().saturating_sub(2));
@@ -75,9 +75,11 @@ impl Spectrum {
         let left = (0..peak).rev().find(|&k| a[k] < level)?;
         let right = (right - 1) as f64 + share_to(level, a[right - 1], a[right]);
         let left = (left + 1) as f64 - share_to(level, a[left + 1], a[left]);
-        Some(HalfPower {
+        let damping_ratio = (right - left) / (2.0 * peak as f64);
+        // A peak as wide as that is no oscillation's.
+        (damping_ratio < 1.0).then_some(HalfPower {
             peak_hz: peak as f64 * self.bin_hz,
-            damping_ratio: (right - left) / (2.0 * peak as f64),
+            damping_ratio,
         })
     }
 }

@@ -6,6 +6,8 @@ use crate::depth;
 use crate::model::{CameraModel, Pinhole, Size};
 use nalgebra::{Point2, Vector2};
 use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -55,6 +57,9 @@ struct Written {
     distortion: Vec<f64>,
     depth_unit_m: Option<f64>,
     depth: Option<DepthCamera>,
+    /// Files of other programs hold more.
+    #[serde(flatten)]
+    others: BTreeMap<String, IgnoredAny>,
 }
 
 impl CameraFile {
@@ -102,6 +107,9 @@ impl CameraFile {
     /// It is no camera: why, in one line.
     pub fn parse(text: &str) -> Result<Self, String> {
         let written: Written = serde_json::from_str(text).map_err(|e| one_line(&e.to_string()))?;
+        if let Some(key) = written.others.keys().find(|key| key.starts_with("depth")) {
+            return Err(format!("{key} is no key of it; depth_unit_m and depth are"));
+        }
         let pinhole = written.pinhole().ok_or("fx, fy, cx or cy is missing")?;
         if !pinhole.is_valid() {
             return Err("fx and fy must be numbers above 0".to_owned());
@@ -191,6 +199,7 @@ mod tests {
             r#"{"fx": 0, "fy": 525, "cx": 1, "cy": 1}"#,
             r#"{"fx": -1e400, "fy": 525, "cx": 1, "cy": 1}"#,
             r#"{"intrinsic_matrix": [1, 2]}"#,
+            r#"{"fx": 525, "fy": 525, "cx": 1, "cy": 1, "depth_unit": 0.001}"#,
             r#"{"fx": 525, "fy": 525, "cx": 1, "cy": 1, "depth_unit_m": 5000}"#,
             r#"{"fx": 525, "fy": 525, "cx": 1, "cy": 1, "distortion": [1, 2, 3, 4, 5, 6, 7, 8, 9]}"#,
         ] {

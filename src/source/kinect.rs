@@ -264,10 +264,7 @@ impl Source for Kinect {
 
     fn warnings(&mut self) -> Vec<String> {
         let mut lines = self.colour.warnings();
-        if self.colour_ended && self.waiting == 0 {
-            let name = self.path.display().to_string();
-            lines.extend(self.tally.take_warnings(&name));
-        }
+        lines.extend(self.tally.take_warnings(&self.path.display().to_string()));
         lines
     }
 }

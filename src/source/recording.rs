@@ -252,9 +252,6 @@ impl Source for Recording {
     }
 
     fn warnings(&mut self) -> Vec<String> {
-        if !self.ended {
-            return Vec::new();
-        }
         let name = self.path.display();
         let kinds = [
             (&mut self.out_of_order, "were not later than the one before"),

@@ -98,7 +98,7 @@ impl RgbdFolder {
             ));
         }
         self.depths = paired(&self.frames, &listed);
-        let Some(first) = self.depths.iter().flatten().next() else {
+        let Some(first) = self.depths.iter().flatten().next().cloned() else {
             let nearest_s = least_apart_s(&self.frames, &listed);
             return Err(SourceError::bad_format(
                 &self.folder,
@@ -109,20 +109,20 @@ impl RgbdFolder {
                 ),
             ));
         };
-        let image = read_depth(first)
-            .map_err(|why| SourceError::bad_format(first, format!("{why}; {INSTEAD}")))?;
+        let image = read_depth(&first)
+            .map_err(|why| SourceError::bad_format(&first, format!("{why}; {INSTEAD}")))?;
         let known = self
             .said(settings)?
             .known(&self.folder, settings, self.size)?;
         known
             .usable(image)
-            .map_err(|what| SourceError::bad_format(first, what))?;
+            .map_err(|what| SourceError::bad_format(&first, what))?;
         self.known = Some(known);
         Ok(())
     }
 
     /// What the folder says of its depth.
-    fn said(&self, settings: &config::Depth) -> Result<SaidOfDepth, SourceError> {
+    fn said(&mut self, settings: &config::Depth) -> Result<SaidOfDepth, SourceError> {
         let file = self.folder.join(CAMERA);
         if !file.exists() {
             if crate::depth::pinhole(settings).is_none() {
@@ -132,6 +132,7 @@ impl RgbdFolder {
                      cy (px) into it, or give --depth-camera FILE, or --no-depth",
                 ));
             }
+            self.say_usual_unit(settings);
             return Ok(SaidOfDepth {
                 unit_m: Some(UNIT_M),
                 ..SaidOfDepth::default()
@@ -143,7 +144,21 @@ impl RgbdFolder {
             let what = format!("it is for pictures of {size}, these are {}", self.size);
             return Err(SourceError::bad_format(&file, what));
         }
+        if camera.unit_m.is_none() {
+            self.say_usual_unit(settings);
+        }
         Ok(camera.said(self.size, UNIT_M))
+    }
+
+    /// Says that nothing says how long a count of its depth is, unless the user does.
+    fn say_usual_unit(&mut self, settings: &config::Depth) {
+        if settings.unit_m == 0.0 {
+            self.news.push(format!(
+                "{}: nothing says how long a count of its depth is: taken as {UNIT_M} m, as usual in such folders; \
+                 give depth_unit_m in camera.json, or --depth-unit, if lengths are wrong",
+                self.folder.display()
+            ));
+        }
     }
 
     /// The depth image of frame `k`, if there is one that can be used.
@@ -210,9 +225,7 @@ impl Source for RgbdFolder {
 
     fn warnings(&mut self) -> Vec<String> {
         let mut lines = std::mem::take(&mut self.news);
-        if self.next == self.frames.len() {
-            lines.extend(self.tally.take_warnings(&self.folder.display().to_string()));
-        }
+        lines.extend(self.tally.take_warnings(&self.folder.display().to_string()));
         lines
     }
 }
