@@ -26,7 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
-import cloud_score, treefile
+import cloud_score, made_clouds, treefile
 
 HERE = Path(__file__).parent
 SCORED_POINTS = 60_000
@@ -43,6 +43,7 @@ def main():
     parser.add_argument("--in-leaf", action="store_true", help="clouds with leaves, which arborcam takes off")
     parser.add_argument("--keep", action="store_true", help="keep clouds and trees in the folder --work")
     parser.add_argument("--trees", type=int, default=1)
+    parser.add_argument("--thin", type=int, metavar="POINTS", help="so many points of a cloud, by chance, with the ground")
     args, of_cloud = parser.parse_known_args()
     if args.treefiles and (args.trees > 1 or len(args.treefiles) != args.last - args.first + 1):
         parser.error("--treefiles needs one file for each seed, and no --trees")
@@ -56,6 +57,8 @@ def main():
         if not (folder / "truth.json").exists():
             foreign = ["--treefile", args.treefiles[seed - args.first]] if args.treefiles else []
             subprocess.run([sys.executable, HERE / "made_clouds.py", work, str(seed), str(seed), *of_cloud, *foreign], check=True)
+        if args.thin:
+            folder = thinned(folder, args.thin)
         row = (run if args.trees == 1 else run_plot)(args.arborcam, folder, how)
         if row is None:
             failed.append(seed)
@@ -78,6 +81,18 @@ def run(arborcam, folder, how):
     points = read_points(folder / "cloud.ply")
     row = score(arborcam, tree, json.loads((folder / "truth.json").read_text()), points)
     return row | dict(points=len(points), **used)
+
+
+def thinned(folder, count):
+    """The folder of a part of its cloud."""
+    points, tree = read_points(folder / "cloud.ply"), np.load(folder / "tree.npy")
+    part = np.random.default_rng(count).choice(len(points), min(count, len(points)), False)
+    thin = folder.with_name(f"{folder.name}-{count}")
+    thin.mkdir(exist_ok=True)
+    made_clouds.write(thin / "cloud.ply", points[part], "ply")
+    np.save(thin / "tree.npy", tree[part])
+    shutil.copy(folder / "truth.json", thin)
+    return thin
 
 
 def run_plot(arborcam, folder, how):
