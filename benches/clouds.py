@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Trees from point clouds against the true ones.
 
-  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--treefiles FILE...] [--work DIR] [--method paths|colonisation] [--in-leaf] [--keep] [options of made_clouds.py]
+  clouds.py ARBORCAM FIRST_SEED LAST_SEED [--treefiles FILE...] [--work DIR] [--method paths|colonisation] [--in-leaf] [--keep]
+            [--thin POINTS] [options of made_clouds.py]
 
 For each seed: a cloud by made_clouds.py, `arborcam cloud` and `arborcam export --format treefile` on it, and the figures of cloud_score.py:
 
@@ -17,7 +18,8 @@ the figures above, and also:
   trees            found, of N
   right, wrong     share of the points of true trees that are given to the right tree, and to another; the rest is given to none
 
-With --treefiles the tree of seed FIRST_SEED is that of the first file, and so on: trees of another program.
+With --treefiles the tree of seed FIRST_SEED is that of the first file, and so on: trees of another program. With --thin so many points of
+each cloud are taken by chance.
 
 A cloud that gives no tree is counted and named. Claims are made on seeds that nothing was tuned on. Needs numpy and scipy.
 """

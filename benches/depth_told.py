@@ -12,8 +12,8 @@ its depth and the deterministic pose. One row a film:
                                                                          from the foot, at rest, % of the tree's height: median with depth
   without     the same without depth
   scale %     error of metres_per_px
-  moves mm    how the measured node nearest to each marker (within 12 px in the picture, else none) moves along the line of sight against the marker, standard deviation of the difference,
-              median of the markers: with depth, without, deterministic; true: of the markers' own motion
+  moves mm    how the measured node nearest to each marker (within 12 px in the picture, else none) moves along the line of sight
+              against the marker, standard deviation of the difference, median of the markers: with depth, without, deterministic; true: of the markers' own motion
 """
 import argparse, csv, json, subprocess, tempfile
 from collections import defaultdict

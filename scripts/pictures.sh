@@ -311,12 +311,11 @@ markers() {
 # it told, and scans of both with the trees that space colonisation grows. In films with markers branches act back on what carries them.
 hu() {
     local seed=53101 other=53102 name
-    local structure=(--acts-back 1.6)
-    pulled all $seed "${structure[@]}"
-    pulled at-1 $seed --rope-at 1 "${structure[@]}"
-    pulled at-1-half $seed --rope-at 1 --force 0.5 "${structure[@]}"
-    pulled at-3 $seed --rope-at 3 "${structure[@]}"
-    pulled other $other "${structure[@]}"
+    pulled all $seed
+    pulled at-1 $seed --rope-at 1
+    pulled at-1-half $seed --rope-at 1 --force 0.5
+    pulled at-3 $seed --rope-at 3
+    pulled other $other
     "$python" scripts/pictures.py angles "$to/hu-angles.png" \
         "branch 3|time|$(swing at-1 3)" "its spectrum|spectrum|$(swing at-1 3)" "branch 18, on branch 3|time|$(swing at-1 18)" \
         "its spectrum|spectrum|$(swing at-1 18)" "branch 1|time|$(swing at-1 1)" "its spectrum|spectrum|$(swing at-1 1)" \
@@ -343,7 +342,7 @@ hu() {
 pulled() {
     local name=$1 seed=$2 film=$work/pulled-$1
     shift 2
-    "$python" benches/made_films.py "$work" "pulled-$name" "$seed" bare held --markers 10 --seconds 13.634 "$@" ||
+    "$python" benches/made_films.py "$work" "pulled-$name" "$seed" bare held --markers 10 --seconds 13.634 --acts-back 1.6 "$@" ||
         fail "no film with markers could be made; see the head of benches/made_films.py for what PYTHON needs"
     "$arborcam" replay "$film/video.mkv" --outline "$film/outline.json" --markers "$film/markers.json" --fast --headless \
         --out "$film-tree" 2>"$film.log" || fail "the replay of $name failed: $(tail -n 1 "$film.log")"

@@ -53,7 +53,7 @@ class Structure:
             b.pull_rad = size * angle
 
     def free_decay(self, start, time_s, release_s):
-        """(frames, branches, 2): let go at release_s from these angles."""
+        """(frames, branches, 2): released from these angles, at rest, at release_s."""
         t = np.maximum(time_s - release_s, 0.0)[:, None]
         w = 2 * np.pi * self.hz
         wd = w * np.sqrt(1 - self.damping**2)
