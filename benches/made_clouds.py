@@ -2,7 +2,7 @@
 """Point clouds of made-up trees whose true wood is known, as a laser scanner on a few tripods gives them.
 
   made_clouds.py OUT_DIR NAME SEED [--leaves] [--trees N [--apart M]] [--no-ground] [--scanners N] [--step DEG] [--noise MM] [--format ply|xyz]
-                 [--treefile FILE]
+                 [--treefile FILE] [--even POINTS]
 
 Why: a tree from a cloud can be scored only against one that is known. The tree of a seed is the one that made_films.py films
 with the same seed, so that a film can be laid on the scan.
@@ -21,6 +21,8 @@ across. Needs numpy.
 With --trees N several trees, each turned and 0.6 to 1.2 times as large as the one of its seed (SEED, 1000 SEED + 1, ...), stand on one
 plot, no two trunks nearer than --apart: their crowns reach into each other. Then truth.json has a list "trees", each with its foot and
 branches, and scanners stand among them, too.
+
+With --even no scanner is there: so many points lie on all surfaces by chance, as photogrammetry and walking scanners give them.
 
 With --treefile the tree is that of a file of another program (`treecreate` of treetools, say), and SEED only places the scanners.
 """
@@ -53,6 +55,7 @@ def main():
     parser.add_argument("--noise", type=float, help="standard deviation along the ray, mm; 2 to 5 by chance")
     parser.add_argument("--format", choices=["ply", "xyz"], default="ply")
     parser.add_argument("--treefile", type=Path)
+    parser.add_argument("--even", type=int, metavar="POINTS")
     args = parser.parse_args()
     make(args.out_dir / args.name, args)
 
@@ -86,7 +89,10 @@ def make(folder, args):
         of_tree.append(np.full(len(floor), -1))
     samples, owner, of_tree = np.concatenate(samples), np.concatenate(owner), np.concatenate(of_tree)
     feet = np.array([one.foot[:2] for one in trees])
-    points, seen = scan(rng, samples, tripods(rng, scanners, feet, plot_m), args.step, noise_m)
+    if args.even:
+        points, seen = even(rng, samples, args.even, noise_m)
+    else:
+        points, seen = scan(rng, samples, tripods(rng, scanners, feet, plot_m), args.step, noise_m)
     owner, of_tree = owner[seen], of_tree[seen]
     azimuth, shift = rng.uniform(0, 2 * np.pi), np.r_[rng.uniform(-400, 400, 2), rng.uniform(80, 300)]
     turn = np.array([[np.cos(azimuth), -np.sin(azimuth), 0], [np.sin(azimuth), np.cos(azimuth), 0], [0, 0, 1]])
@@ -224,6 +230,12 @@ def scan(rng, samples, places, step_deg, noise_m):
         points.append(met + rng.normal(0, 0.5 * noise_m, met.shape))
         met_samples.append(seen)
     return np.concatenate(points), np.concatenate(met_samples)
+
+
+def even(rng, samples, count, noise_m):
+    """So many of the samples, with noise, and which these are."""
+    seen = rng.choice(len(samples), count, False)
+    return samples[seen] + rng.normal(0, 0.5 * noise_m, (count, 3)), seen
 
 
 def write(path, points, form):

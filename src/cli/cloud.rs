@@ -13,7 +13,9 @@ use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cl
 use crate::config::Config;
 use crate::document::Document;
 use crate::files::check_place;
-use crate::import::{CloudFormat, CloudRead, ImportError, TALL_M, Units, cover_px, read_cloud};
+use crate::import::{
+    CloudFormat, CloudRead, ImportError, TALL_M, TooFewSaid, Units, cover_px, read_cloud,
+};
 use crate::model::{PointCloud, Verdict};
 use crate::outline;
 use crate::pipeline::stand_scanned;
@@ -142,6 +144,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         cloud,
         units_in_file,
         unknown_system,
+        too_few_said,
     } = read(&args.file, args.unit.map(Unit::metres))?;
     print_units(units_in_file);
     let options = CloudOptions {
@@ -151,6 +154,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
     };
     let found = trees_of_cloud(&cloud, options).map_err(|e| args.failed(e))?;
     print_left_out(cloud.not_finite);
+    print_too_few_said(too_few_said);
     let given = args.unit.map(|unit| Units::all(unit.metres()));
     let scan = Scan {
         name: args
@@ -453,6 +457,16 @@ fn print_left_out(not_finite: usize) {
         };
         eprint_line(&format!(
             "arborcam: note: {not_finite} {points} left out: not all of {their} coordinates are numbers"
+        ));
+    }
+}
+
+/// A warning of a header that does not say all points.
+fn print_too_few_said(said: Option<TooFewSaid>) {
+    if let Some(TooFewSaid { said, room }) = said {
+        eprint_line(&format!(
+            "arborcam: warning: the header says {said} points, and there is room for {room} in the file: those behind \
+             are not read. Perhaps its writing was not finished: have a program for point clouds write it anew"
         ));
     }
 }

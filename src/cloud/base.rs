@@ -15,6 +15,8 @@ const LOW_SHARE: f64 = 0.15;
 /// A path that is at least this share of the tree's height long is another stem: above where it leaves the
 /// trunk the middle is not that of one.
 const STEM_SHARE: f64 = 0.3;
+/// It is not believed nearer than so many radii below where such a stem leaves: the trunk widens there.
+const FORK_RADII: f64 = 1.5;
 /// No trunk leans more, as a slope.
 const STEEPEST_LEAN: f64 = 1.0;
 
@@ -70,7 +72,7 @@ impl Axis {
         let radius = median(circles.map(|m| m.radius).collect(), f64::total_cmp)?;
         let fork = lowest_stem(paths, STEM_SHARE * height).unwrap_or(f64::INFINITY);
         let [from, to] = CLEAR_RADII.map(|radii| ground + radii * radius);
-        let to = to.min(fork);
+        let to = to.min(fork - FORK_RADII * radius);
         let half = 0.5 * (from + to);
         let [lower, upper] = [middle(trunk, from, half)?, middle(trunk, half, to)?];
         let way: Vector3<f64> = upper - lower;

@@ -1,6 +1,7 @@
 //! Where the tree stands: the lowest points of its trunk.
 
 use super::CloudError;
+use super::from_above;
 use super::graph::{Graph, Ways};
 use nalgebra::{Point3, Vector3};
 
@@ -33,7 +34,7 @@ pub(super) fn find(
     height: f32,
     cell: f32,
 ) -> Result<Vec<u32>, CloudError> {
-    let stands = stands(points, graph, height, cell);
+    let stands = stands(points, height, cell);
     let seeds: Vec<u32> = stands.iter().flat_map(|s| &s.lowest).copied().collect();
     let ways = graph.shortest_ways(&seeds);
     let bottom = points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
@@ -53,11 +54,11 @@ pub(super) fn find(
     Ok(lowest.copied().collect())
 }
 
-/// What hangs together in the lowest part of the tree.
-fn stands(points: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<Stand> {
+/// What hangs together in the lowest part of the tree, seen from above: few points make a torn trunk.
+fn stands(points: &[Point3<f32>], height: f32, cell: f32) -> Vec<Stand> {
     let bottom = points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
     let slab = bottom + SLAB_SHARE * height;
-    let members = graph.members_where(|p| points[p as usize].z <= slab);
+    let members = from_above::pieces(points, cell, |at| at.z <= slab);
     members
         .iter()
         .map(|own| Stand::of(own, points, cell))

@@ -75,15 +75,22 @@ impl Ways {
 impl Graph {
     /// Joins all points nearer to each other than `reach`.
     pub fn new(points: &[Point3<f32>], reach: f32) -> Self {
-        let grid = Grid::new(points, reach);
+        Self::of_reaches(points, &vec![reach; points.len()])
+    }
+
+    /// Joins all points nearer to each other than the smaller of their two reaches.
+    pub fn of_reaches(points: &[Point3<f32>], reaches: &[f32]) -> Self {
+        let least = reaches.iter().copied().fold(f32::INFINITY, f32::min);
+        let grid = Grid::new(points, least.min(f32::MAX));
         let mut graph = Self {
             starts: Vec::with_capacity(points.len() + 1),
             ends: Vec::new(),
         };
         for (i, at) in (0..).zip(points) {
             graph.starts.push(graph.ends.len() as u32);
+            let reach = reaches[i as usize];
             grid.within(at, reach, |to, square| {
-                if to != i {
+                if to != i && square < reaches[to as usize].powi(2) {
                     graph.ends.push(Edge {
                         to,
                         way: square.sqrt(),
@@ -154,20 +161,6 @@ impl Graph {
             next += 1;
         }
         piece
-    }
-
-    /// The points of each piece of those that `is_wanted` wants.
-    pub fn members_where(&self, is_wanted: impl Fn(u32) -> bool) -> Vec<Vec<u32>> {
-        let pieces = self.pieces_where(|a, b| is_wanted(a) && is_wanted(b));
-        let count = pieces.iter().max().map_or(0, |p| *p as usize + 1);
-        let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
-        for (point, piece) in (0..).zip(&pieces) {
-            if is_wanted(point) {
-                members[*piece as usize].push(point);
-            }
-        }
-        members.retain(|m| !m.is_empty());
-        members
     }
 
     /// The shortest ways to the nearest of these points (Dijkstra 1959).

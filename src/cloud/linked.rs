@@ -18,9 +18,15 @@ const FINEST_TREES: usize = 20;
 /// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
 /// each of their points would take long.
 const GAP_OF_STAND_CELLS: f32 = 8.0;
-/// Points are neighbours up to so many cells apart; gaps are led over up to this share of the
+/// Points are neighbours up to so many times their distance about there; gaps are led over up to this share of the
 /// tree's height.
 const REACH_CELLS: f32 = 1.8;
+/// The distance of points about a place is the median of those that are so many cells away, and no more than so many
+/// cells: a trunk may be sparser than twigs, and a gap is none of its points.
+const ABOUT_CELLS: f32 = 5.0;
+const SPARSEST_CELLS: f32 = 2.0;
+/// The distance of a point is that to this one of its neighbours.
+const NEIGHBOUR: usize = 3;
 const GAP_SHARE: f32 = 0.1;
 /// A tree whose lowest wood is farther above the ground than this share of its height has no trunk.
 const TRUNKLESS: f32 = 0.25;
@@ -60,7 +66,9 @@ impl Linked {
 
     /// Gaps are led over up to `widest`.
     fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
-        let graph = Graph::new(&thinned.points, REACH_CELLS * cell);
+        let mut reaches = spacings_about(&thinned.points, cell);
+        reaches.iter_mut().for_each(|s| *s *= REACH_CELLS);
+        let graph = Graph::of_reaches(&thinned.points, &reaches);
         Self {
             thinned,
             cell,
@@ -136,6 +144,36 @@ fn thinned(
     Ok((thinned, cell))
 }
 
+/// The distance of points about each of them, between `cell` and [`SPARSEST_CELLS`].
+fn spacings_about(points: &[Point3<f32>], cell: f32) -> Vec<f32> {
+    let grid = Grid::new(points, SPARSEST_CELLS * cell);
+    let most = SPARSEST_CELLS * cell;
+    let mut own: Vec<f32> = Vec::with_capacity(points.len());
+    let mut near: Vec<f32> = Vec::new();
+    for at in points {
+        near.clear();
+        grid.within(at, most, |_, square| near.push(square));
+        own.push(match near.len() > NEIGHBOUR {
+            true => near
+                .select_nth_unstable_by(NEIGHBOUR, f32::total_cmp)
+                .1
+                .sqrt(),
+            false => most,
+        });
+    }
+    let mut about: Vec<f32> = Vec::with_capacity(points.len());
+    for at in points {
+        near.clear();
+        grid.within(at, ABOUT_CELLS * cell, |point, _| {
+            near.push(own[point as usize])
+        });
+        let middle = near.len() / 2;
+        let median = *near.select_nth_unstable_by(middle, f32::total_cmp).1;
+        about.push(median.max(cell));
+    }
+    about
+}
+
 /// The median distance of points to the third of their neighbours: of a sparse cloud it is more
 /// than the side of the cells.
 fn spacing(points: &[Point3<f32>], cell: f32) -> f32 {
@@ -145,13 +183,65 @@ fn spacing(points: &[Point3<f32>], cell: f32) -> f32 {
     for at in points.iter().step_by(step) {
         let mut near: Vec<f32> = Vec::new();
         let mut reach = 4.0 * cell;
-        while near.len() < 4 && reach < 1000.0 * cell {
+        while near.len() <= NEIGHBOUR && reach < 1000.0 * cell {
             near.clear();
             grid.within(at, reach, |_, square| near.push(square));
             reach *= 2.0;
         }
         near.sort_unstable_by(f32::total_cmp);
-        thirds.extend(near.get(3).map(|square| f64::from(square.sqrt())));
+        thirds.extend(near.get(NEIGHBOUR).map(|square| f64::from(square.sqrt())));
     }
     median(thirds, f64::total_cmp).map_or(cell, |third| third as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Generator, generator};
+    use rand::RngExt;
+
+    /// Points by chance on an upright tube.
+    fn tube(chance: &mut Generator, count: usize, radius: f32, x: f32) -> Vec<Point3<f32>> {
+        let mut points = Vec::with_capacity(count);
+        for _ in 0..count {
+            let angle = std::f32::consts::TAU * chance.random::<f32>();
+            let up = chance.random::<f32>();
+            points.push(Point3::new(
+                x + radius * angle.cos(),
+                radius * angle.sin(),
+                up,
+            ));
+        }
+        points
+    }
+
+    /// The most of the first 6000 points that hang together.
+    fn largest(graph: &Graph) -> Option<usize> {
+        let pieces = graph.pieces();
+        let mut sizes = vec![0; pieces.len()];
+        pieces[..6000].iter().for_each(|p| sizes[*p as usize] += 1);
+        sizes.into_iter().max()
+    }
+
+    #[test]
+    fn a_trunk_sparser_than_twigs_hangs_together() {
+        let mut chance = generator(7, 0);
+        let mut points = tube(&mut chance, 6000, 0.1, 0.0);
+        points.extend(tube(&mut chance, 12_000, 0.03, 0.5));
+        let cell = spacing(&points, 0.005);
+        let spacings = spacings_about(&points, cell);
+        assert!(
+            spacings
+                .iter()
+                .all(|s| (cell..=SPARSEST_CELLS * cell).contains(s))
+        );
+        let trunk = median(
+            spacings[..6000].iter().map(|s| f64::from(*s)).collect(),
+            f64::total_cmp,
+        );
+        assert!(trunk > Some(1.4 * f64::from(cell)), "{trunk:?} {cell}");
+        let reaches: Vec<f32> = spacings.iter().map(|s| REACH_CELLS * s).collect();
+        assert!(largest(&Graph::of_reaches(&points, &reaches)) > Some(5900));
+        assert!(largest(&Graph::new(&points, REACH_CELLS * cell)) < Some(3000));
+    }
 }

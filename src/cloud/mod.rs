@@ -13,6 +13,7 @@ mod colonise;
 mod error;
 mod fit;
 mod foot;
+mod from_above;
 mod graph;
 mod grid;
 mod ground;

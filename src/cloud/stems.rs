@@ -4,6 +4,7 @@
 //! there and is upright. From each the way along wood leads down to where it stands. Every point is
 //! then of the tree whose foot it has the shortest way to (RayCloudTools, Lowe & Stepanas 2021).
 
+use super::from_above;
 use super::graph::{Graph, groups_within};
 use nalgebra::{Point3, Vector3};
 
@@ -83,7 +84,7 @@ pub(super) fn find(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32)
 fn stems(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<Stem> {
     let breast = BREAST_HEIGHT_M.min(BREAST_SHARE * height);
     let half = (SLICE_SHARE * breast).max(SLICE_CELLS * cell);
-    let bottom = above.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
+    let bottom = bottom(above);
     let [low, high, ground] =
         [breast - half, breast + half, FOOT_SHARE * breast].map(|z| bottom + z);
     let on_ground: Vec<u32> = (0..above.len() as u32)
@@ -91,7 +92,7 @@ fn stems(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<St
         .collect();
     let down = graph.shortest_ways(&on_ground);
     let mut stems = Vec::new();
-    for members in graph.members_where(|p| (low..=high).contains(&above[p as usize].z)) {
+    for members in from_above::pieces(above, cell, |at| (low..=high).contains(&at.z)) {
         if !is_upright(above, &members, high - low) {
             continue;
         }
@@ -112,6 +113,11 @@ fn stems(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<St
         stems.push(Stem { foot, middle });
     }
     stems
+}
+
+/// The height of the lowest point: 0 on ground that was scanned.
+fn bottom(above: &[Point3<f32>]) -> f32 {
+    above.iter().map(|p| p.z).fold(f32::INFINITY, f32::min)
 }
 
 /// Whether points reach through a slice so high, and lean by little.
@@ -154,10 +160,9 @@ fn ranked(above: &[Point3<f32>], of_point: &[u32], height: f32) -> Vec<u32> {
         }
     }
     let most = points.iter().max().map_or(0.0, |n| *n as f64);
+    let least_top = bottom(above) + HIGH_SHARE * height;
     let mut order: Vec<usize> = (0..count)
-        .filter(|s| {
-            top[*s] >= HIGH_SHARE * height && points[*s] as f64 >= LEAST_POINTS_SHARE * most
-        })
+        .filter(|s| top[*s] >= least_top && points[*s] as f64 >= LEAST_POINTS_SHARE * most)
         .collect();
     order.sort_by_key(|s| (std::cmp::Reverse(points[*s]), *s));
     let mut ranked = vec![OF_NO_TREE; count];
@@ -210,6 +215,9 @@ mod tests {
         assert!(stand.of_point[..first].iter().all(|t| *t == 1));
         assert!(stand.of_point[first..both].iter().all(|t| *t == 0));
         assert!(stand.of_point[both..].iter().all(|t| *t == OF_NO_TREE));
+        // Where no ground was scanned heights are those of the survey.
+        points.iter_mut().for_each(|p| p.z -= 300.0);
+        assert_eq!(found(&points, 6.0), stand);
     }
 
     #[test]

@@ -36,7 +36,7 @@ mod traced;
 mod treefile;
 mod wood_table;
 
-pub use cloud::{CloudFormat, CloudRead, Units, read_cloud};
+pub use cloud::{CloudFormat, CloudRead, TooFewSaid, Units, read_cloud};
 pub use error::ImportError;
 pub use flat_tree::{FlatTree, cover_px};
 pub use gltf_skeleton::MovingModel;

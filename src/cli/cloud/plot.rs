@@ -11,6 +11,9 @@ use crate::views::{StandingTree, scan_forest};
 use anyhow::anyhow;
 use std::sync::atomic::AtomicBool;
 
+/// Points that are of no tree and no ground are undergrowth and noise; of more than this share of them there is a
+/// warning, percent.
+const MOST_LEFT_OUT_PERCENT: f64 = 5.0;
 /// Where `--points` goes.
 const POINTS_FILE: &str = "points.ply";
 
@@ -72,6 +75,13 @@ fn print_found(scan: &Scan, found: &CloudTrees) {
         figures.percent(of_trees),
         figures.percent(figures.ground),
     ));
+    let left_out = figures.percent(figures.points - of_trees - figures.ground);
+    if left_out > MOST_LEFT_OUT_PERCENT {
+        eprint_line(&format!(
+            "arborcam: warning: {left_out:.0} % of the points are of no tree that was found and not of the ground; where that is \
+             not undergrowth, cut the missing trees out of the scan"
+        ));
+    }
 }
 
 /// The points in the axes of the file, m, with the numbers of their trees from 1 on; 0 for none.

@@ -22,10 +22,13 @@ const HEADER_1_4: usize = 375;
 const EVLR_HEAD: u64 = 60;
 const EVLR_LENGTH_AT: u64 = 20;
 
-/// Where a header has the place of the points and their format, and the bits of that which say that
-/// they are compressed.
+/// Where a header has the place of the points, their format, and the bytes of each, and the bits of the format
+/// which say that they are compressed.
 const POINTS_AT: usize = 96;
 const FORMAT_AT: usize = 104;
+const RECORD_AT: usize = 105;
+/// Where the header of LAS 1.3 has the place of wave forms, which may stand behind the points.
+const WAVES_AT: usize = 227;
 const COMPRESSED: u8 = 0b1100_0000;
 /// Bytes of a chunk of compressed points at least: the first of them is not compressed.
 const LEAST_CHUNK: u64 = 20;
@@ -39,7 +42,7 @@ where
     R: BufRead + Seek + Send + Sync + 'static,
 {
     check_begin(&mut input)?;
-    let size = check_lengths(&mut input).map_err(|e| ImportError::unreadable(&e))?;
+    let lengths = check_lengths(&mut input).map_err(|e| ImportError::unreadable(&e))?;
     // The decompressor panics on some damaged files.
     let read = caught(move || {
         let mut own = Points {
@@ -47,7 +50,7 @@ where
             unit_is_given: points.unit_is_given,
             read: Default::default(),
         };
-        let done = read_points(input, size, &mut own);
+        let done = read_points(input, lengths, &mut own);
         points.read = own.read;
         done
     });
@@ -65,24 +68,71 @@ fn check_begin(input: &mut (impl Read + Seek)) -> Result<(), ImportError> {
     Ok(())
 }
 
-/// What is read at once, be it as long as it says, is not longer than the file. Returns the size of
-/// that, bytes.
-fn check_lengths(input: &mut (impl Read + Seek)) -> std::io::Result<u64> {
+/// How long a file is.
+#[derive(Clone, Copy, Debug)]
+struct Lengths {
+    /// All of it, bytes.
+    size: u64,
+    /// Points that are not compressed for which there is room.
+    records: u64,
+    /// Chunks of points that are compressed.
+    chunks: u64,
+}
+
+impl Lengths {
+    /// Points for which a file has room at least, be it that `said` are in it.
+    fn room(self, header: &las::Header, said: u64) -> u64 {
+        let in_chunks = header
+            .laz_vlr()
+            .ok()
+            .filter(|laz| !laz.uses_variable_size_chunks())
+            .map(|laz| {
+                u64::from(laz.chunk_size()).saturating_mul(self.chunks.saturating_sub(1)) + 1
+            });
+        match header.point_format().is_compressed {
+            true => in_chunks.filter(|_| self.chunks > 0).unwrap_or(said),
+            false => self.records,
+        }
+    }
+}
+
+/// What is read at once, be it as long as it says, is not longer than the file.
+fn check_lengths(input: &mut (impl Read + Seek)) -> std::io::Result<Lengths> {
     let end = input.seek(SeekFrom::End(0))?;
     input.seek(SeekFrom::Start(0))?;
     let mut header = Vec::new();
     input.take(HEADER_1_4 as u64).read_to_end(&mut header)?;
     check_extended_records(input, &header, end)?;
-    check_chunks(input, &header, end)?;
+    let chunks = check_chunks(input, &header, end)?;
     input.seek(SeekFrom::Start(0))?;
-    Ok(end)
+    Ok(Lengths {
+        size: end,
+        records: room_for_records(&header, end),
+        chunks,
+    })
 }
 
-/// Memory for the table of chunks is taken for as many as it says to have.
-fn check_chunks(input: &mut (impl Read + Seek), header: &[u8], end: u64) -> std::io::Result<()> {
+/// How many points that are not compressed stand between the place of the first and what follows in the file.
+fn room_for_records(header: &[u8], end: u64) -> u64 {
+    if header.len() < RECORD_AT + 2 {
+        return 0;
+    }
+    let start = number(&header[POINTS_AT..POINTS_AT + 4]);
+    let behind = [WAVES_AT, EVLR_AT]
+        .into_iter()
+        .zip([3, 4])
+        .filter(|(at, minor)| header.len() >= at + 8 && header[25] >= *minor)
+        .map(|(at, _)| number(&header[at..at + 8]));
+    let end = behind.filter(|place| *place > start).fold(end, u64::min);
+    let record = number(&header[RECORD_AT..RECORD_AT + 2]);
+    end.saturating_sub(start) / record.max(1)
+}
+
+/// Memory for the table of chunks is taken for as many as it says to have, which are returned.
+fn check_chunks(input: &mut (impl Read + Seek), header: &[u8], end: u64) -> std::io::Result<u64> {
     let is_compressed = header.get(FORMAT_AT).is_some_and(|f| f & COMPRESSED != 0);
     if !is_compressed {
-        return Ok(());
+        return Ok(0);
     }
     let start = number(&header[POINTS_AT..POINTS_AT + 4]);
     let mut table = number_at(input, start)?;
@@ -94,7 +144,7 @@ fn check_chunks(input: &mut (impl Read + Seek), header: &[u8], end: u64) -> std:
     if chunks > end / LEAST_CHUNK {
         return Err(std::io::ErrorKind::UnexpectedEof.into());
     }
-    Ok(())
+    Ok(chunks)
 }
 
 /// The eight bytes at a place.
@@ -129,10 +179,11 @@ pub(super) fn number(bytes: &[u8]) -> u64 {
         .fold(0, |sum, byte| (sum << 8) | u64::from(*byte))
 }
 
-fn read_points<R>(mut input: R, size: u64, points: &mut Points) -> Result<(), ImportError>
+fn read_points<R>(mut input: R, lengths: Lengths, points: &mut Points) -> Result<(), ImportError>
 where
     R: BufRead + Seek + Send + Sync + 'static,
 {
+    let size = lengths.size;
     let points_end = end_of_chunks(&mut input, size).map_err(damaged)?;
     let mut reader = Reader::new(ChunkedFile::new(input, points_end)).map_err(damaged)?;
     let said = reader.header().number_of_points();
@@ -150,6 +201,7 @@ where
             "its header says {said} points, and the file has {size} bytes"
         )));
     }
+    points.said_too_few(said, lengths.room(reader.header(), said));
     let records = reader.header().all_vlrs();
     if !points.unit_is_given {
         for record in records {

@@ -57,6 +57,16 @@ pub struct CloudRead {
     pub units_in_file: Option<Units>,
     /// The EPSG number of the file's coordinate system, where nothing says the unit of that.
     pub unknown_system: Option<u64>,
+    /// Where a header says fewer points than the file has room for; those behind are not read.
+    pub too_few_said: Option<TooFewSaid>,
+}
+
+/// A header that says fewer points than its file has room for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TooFewSaid {
+    pub said: u64,
+    /// For so many there is room, at least.
+    pub room: u64,
 }
 
 /// The units of coordinates.
@@ -128,6 +138,11 @@ impl Points {
         self.read.units_in_file = Some(units);
         self.read.unknown_system = None;
         self.units = units;
+    }
+
+    /// Notes how many points a header says, and for how many the file has room.
+    fn said_too_few(&mut self, said: u64, room: u64) {
+        self.read.too_few_said = (said < room).then_some(TooFewSaid { said, room });
     }
 
     /// Takes a point in the unit of the file.

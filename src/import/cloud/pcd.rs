@@ -53,11 +53,18 @@ pub(super) fn read(mut input: impl BufRead, points: &mut Points) -> Result<(), I
                 let [x, y, z] = columns.map(|c| c.field(&header).number(&bytes[c.offset..]));
                 points.push(x, y, z)?;
             }
+            let behind = bytes_behind(&mut input)? / row as u64;
+            points.said_too_few(header.points, header.points + behind);
             Ok(())
         }
         "binary_compressed" => read_compressed(input, &header, columns, points),
         other => Err(ImportError::bad_format(format!("its data are {other:?}"))),
     }
+}
+
+/// How many bytes follow.
+fn bytes_behind(input: &mut impl BufRead) -> Result<u64, ImportError> {
+    std::io::copy(input, &mut std::io::sink()).map_err(|e| ImportError::unreadable(&e))
 }
 
 /// Where x, y or z is in a row.
@@ -185,12 +192,7 @@ fn read_text(
     points: &mut Points,
 ) -> Result<(), ImportError> {
     for number in 0..header.points {
-        let mut line = Vec::new();
-        let read = (&mut input)
-            .take(16 * LONGEST_LINE)
-            .read_until(b'\n', &mut line);
-        read.map_err(|e| ImportError::unreadable(&e))?;
-        let text = String::from_utf8_lossy(&line);
+        let text = next_row(&mut input)?;
         let words: Vec<&str> = text.split_whitespace().collect();
         let value = |c: Column| words.get(c.word).and_then(|w| w.parse::<f64>().ok());
         let [Some(x), Some(y), Some(z)] = columns.map(value) else {
@@ -203,7 +205,24 @@ fn read_text(
         };
         points.push(x, y, z)?;
     }
+    let mut rows = header.points;
+    loop {
+        let text = next_row(&mut input)?;
+        if text.is_empty() {
+            break;
+        }
+        rows += u64::from(!text.trim().is_empty());
+    }
+    points.said_too_few(header.points, rows);
     Ok(())
+}
+
+/// The next line of data, or as much of it as is read at once; empty at the end.
+fn next_row(input: &mut impl BufRead) -> Result<String, ImportError> {
+    let mut line = Vec::new();
+    let read = input.take(16 * LONGEST_LINE).read_until(b'\n', &mut line);
+    read.map_err(|e| ImportError::unreadable(&e))?;
+    Ok(String::from_utf8_lossy(&line).into_owned())
 }
 
 /// The fields one after the other, each of all points.

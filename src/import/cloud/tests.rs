@@ -102,8 +102,13 @@ fn ply_is_read_as_text_and_as_bytes_and_to_its_end() {
 fn pcd_is_read_in_its_three_ways() {
     let text = format!("{PCD}DATA ascii\n{TEXT}");
     expected(&read_bytes(text.as_bytes(), CloudFormat::Pcd).expect("sound"));
+    let more = format!("{text}\n7 8 9 10\n11 12 13 14\n");
+    let said = said_too_few(more.as_bytes(), CloudFormat::Pcd).1;
+    assert_eq!(said, Some((3, 5)));
     let mut bytes = format!("{PCD}DATA binary\n").into_bytes();
     bytes.extend(floats(&ROWS));
+    let more = [bytes.clone(), floats(&ROWS)].concat();
+    assert_eq!(said_too_few(&more, CloudFormat::Pcd).1, Some((3, 6)));
     expected(&read_bytes(&bytes, CloudFormat::Pcd).expect("sound"));
     assert!(read_bytes(&bytes[..bytes.len() - 1], CloudFormat::Pcd).is_err());
     // The fields one after the other, as literal runs.
@@ -175,6 +180,13 @@ fn las_file(points: &[[f64; 3]], compressed: bool) -> Vec<u8> {
     bytes
 }
 
+/// The points that are read, and what a header says and for how many there is room, where that is more.
+fn said_too_few(bytes: &[u8], format: CloudFormat) -> (usize, Option<(u64, u64)>) {
+    let read = read_cloud(Cursor::new(bytes.to_vec()), format, None).expect("readable");
+    let said = read.too_few_said.map(|few| (few.said, few.room));
+    (read.cloud.points.len(), said)
+}
+
 #[test]
 fn las_and_laz_are_read_whatever_extent_they_claim() {
     let points = [[1001.0, 1002.0, 1003.0], [1004.0, 1005.5, 1006.0]];
@@ -205,6 +217,19 @@ fn las_and_laz_are_read_whatever_extent_they_claim() {
             Err(ImportError::TooMany { .. })
         ));
     }
+    // Fewer points than there are: the first are read, and that is noted.
+    let mut lie = las_file(&points, false);
+    lie[107..111].copy_from_slice(&1_u32.to_le_bytes());
+    lie[247..255].copy_from_slice(&1_u64.to_le_bytes());
+    assert_eq!(said_too_few(&lie, CloudFormat::Las), (1, Some((1, 2))));
+    let many: Vec<[f64; 3]> = (0..50_001)
+        .map(|k| [1000.0 + f64::from(k), 1000.0, 1000.0])
+        .collect();
+    let mut lie = las_file(&many, true);
+    assert_eq!(said_too_few(&lie, CloudFormat::Las), (50_001, None));
+    lie[107..111].copy_from_slice(&7_u32.to_le_bytes());
+    lie[247..255].copy_from_slice(&7_u64.to_le_bytes());
+    assert_eq!(said_too_few(&lie, CloudFormat::Las), (7, Some((7, 50_001))));
     // A layer of 4 GB in a file of some hundred bytes: its size stands behind the first point of 30 bytes and
     // the number of points, and the chunks behind the place of their table.
     let lie = las_file(&points, true);
