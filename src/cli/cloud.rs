@@ -358,14 +358,13 @@ impl CloudArgs {
             }
         }
         let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
-        let fit = register_film(tree, film, pairs).filter(FilmFit::holds);
-        let fit = fit.ok_or_else(|| {
+        let found = register_film(tree, film, pairs);
+        let fit = found.filter(FilmFit::holds).ok_or_else(|| {
             let what = match self.pairs {
-                Some(_) => "the pairs of --pairs do not agree with each other; check them, or give more",
-                None => {
-                    "it is not found from where it was filmed; if it is of this tree, give three places in both \
-                     with --pairs"
-                }
+                Some(_) => pairs_say_too_little(found.as_ref()),
+                None => "it is not found from where it was filmed; if it is of this tree, give three places in both \
+                         with --pairs"
+                    .to_owned(),
             };
             CommandError::Failed(anyhow!("--film {}: {what}", film.dir.display()))
         })?;
@@ -399,15 +398,22 @@ fn is_at(tree: &CloudTree, place: &Point3<f64>) -> bool {
 
 /// How well a film lies on a scan.
 fn lies_on(fit: &FilmFit) -> String {
-    match fit.off_hi {
-        Some(off) => format!(
-            "the film lies on the scan within {:.1} % of its height",
-            100.0 * off
+    format!(
+        "the film lies on the scan within {:.1} % of its height",
+        100.0 * fit.off_hi
+    )
+}
+
+/// Why a film does not lie on its scan by the pairs of a user.
+fn pairs_say_too_little(fit: Option<&FilmFit>) -> String {
+    match fit.filter(|fit| fit.registration.holds()) {
+        Some(fit) => format!(
+            "the lines of film and scan do not confirm the pairs of --pairs, and these alone leave places off by up to \
+             {:.1} % of the height, where 2 % are allowed; give more, all over the tree",
+            100.0 * fit.off_hi
         ),
-        None => format!(
-            "the film lies on the scan, where the pairs agree within {:.1} % of its height",
-            100.0 * fit.registration.miss
-        ),
+        None => "the pairs of --pairs do not agree with each other, or lie on one line; check them, or give more"
+            .to_owned(),
     }
 }
 

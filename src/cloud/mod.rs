@@ -249,12 +249,17 @@ fn tree_of(
             width_m,
         });
     }
-    if !HEIGHTS_M.contains(&figures.height_m) {
-        return Err(CloudError::OddSize {
-            height_m: figures.height_m,
-        });
-    }
+    check_height(figures.height_m)?;
     Ok(CloudTree { nodes, figures })
+}
+
+/// # Errors
+/// No tree is so high: the unit is another one.
+pub fn check_height(height_m: f64) -> Result<(), CloudError> {
+    if HEIGHTS_M.contains(&height_m) {
+        return Ok(());
+    }
+    Err(CloudError::OddSize { height_m })
 }
 
 /// Lets every path end where its last points do.

@@ -172,7 +172,7 @@ pub struct ScanFilmNote {
     #[serde(default)]
     pub shift_px: [f64; 2],
     /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
-    /// square over the tree, as a share of its height; `null` by pairs alone.
+    /// square over the tree, as a share of its height; `null` by pairs alone in older files.
     #[serde(default)]
     pub off_hi: Option<f64>,
     /// Of a film in wind: how far the tree leans to the right against the scan, and `off_hi` for the

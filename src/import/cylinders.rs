@@ -112,10 +112,16 @@ impl Columns {
                 });
             }
         }
-        let missing = OURS.columns.iter().find(|name| place(name).is_none());
-        let name = missing.copied().unwrap_or_default();
+        // Of the tool whose table it is most like.
+        let missing = [OURS, SIMPLE_FOREST, ARCHI].map(|table| {
+            let mut names = table.columns.to_vec();
+            names.retain(|name| place(name).is_none());
+            names
+        });
+        let fewest = missing.into_iter().min_by_key(Vec::len).unwrap_or_default();
         Err(ImportError::bad_format(format!(
-            "it has no column {name}, and is no table of cylinders"
+            "a table of cylinders has columns that it has not: {}",
+            fewest.join(", ")
         )))
     }
 

@@ -18,7 +18,10 @@ impl WoodTable {
     /// Which one begins with this text; `None` if none does.
     pub fn of(begin: &str) -> Option<Self> {
         let header = header(begin);
-        if has_cell(header, "parentID") || has_cell(header, "parent_ID") {
+        let is_of_cylinders = ["parentID", "parent_ID", "endX", "end_x"]
+            .iter()
+            .any(|name| has_cell(header, name));
+        if is_of_cylinders {
             Some(Self::Cylinders)
         } else if has_cell(header, "parent_id") {
             Some(Self::Treefile)
@@ -88,6 +91,8 @@ mod tests {
                 "height; x;y;z;radius;parent_id\n",
                 Some(WoodTable::Treefile),
             ),
+            // Its parents are missing, which is named when it is read.
+            ("ID,startX,startY,startZ,endX\n", Some(WoodTable::Cylinders)),
             ("x,y,z\n1,2,3\n", None),
             ("", None),
         ] {

@@ -9,7 +9,7 @@
 //! lines alone cannot part the two. What is known of the upright does.
 
 use super::film_lines::{FilmPiece, Lines, moved};
-use crate::cloud::{Registration, WoodPiece};
+use crate::cloud::{PlacePair, Registration, WoodPiece};
 use nalgebra::{Point3, Similarity2, Vector2};
 
 /// Rounds of pairing; it stands still when nothing moves by more than this share of the height.
@@ -27,13 +27,19 @@ const WIND_OFF_SHARE: f64 = 0.009;
 const CAMERA_ROLL_SD_DEG: f64 = 1.0;
 const TAG_HANGS_SD_DEG: f64 = 0.5;
 
+/// Standard deviation of a place that a user finds in a film and in its scan, as a share of the height: 2 px and 2 cm
+/// of a tree 6 m and 500 px high. What pairs miss each other by counts where it is more.
+const PAIR_SD_SHARE: f64 = 0.005;
+
 /// How a film lies on a scan, and how surely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmFit {
     pub registration: Registration,
     /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
-    /// square over the tree, as a share of its height; `None` by pairs of places alone.
-    pub off_hi: Option<f64>,
+    /// square over the tree, as a share of its height.
+    pub off_hi: f64,
+    /// Whether nothing but pairs of places says it: lines do not agree.
+    pub by_pairs_alone: bool,
     /// Of a film in wind.
     pub lean: Option<Lean>,
 }
@@ -58,18 +64,31 @@ pub enum Upright {
 }
 
 impl FilmFit {
-    /// Of a registration by pairs of places.
-    pub fn by_pairs(registration: Registration) -> Self {
-        Self {
+    /// Of a registration by pairs of places alone, by the covariance of least squares. `is_wind` says whether the tree
+    /// was filmed in wind. `None` where the places say too little, as on one line.
+    pub fn by_pairs(
+        registration: Registration,
+        pairs: &[PlacePair],
+        film: &[FilmPiece],
+        scan: &[WoodPiece<Point3<f64>>],
+        is_wind: bool,
+    ) -> Option<Self> {
+        let lines = Lines::of(film, scan, registration.to_picture.scaling())?;
+        let sd_share = lines.pairs_miss(&registration, pairs)?.max(PAIR_SD_SHARE);
+        let covariance = lines.pairs_covariance(&registration, pairs, sd_share)?;
+        let off_sd = lines.spread(&registration, &covariance);
+        let wind_off = if is_wind { WIND_OFF_SHARE } else { 0.0 };
+        Some(Self {
             registration,
-            off_hi: None,
+            off_hi: (SDS * off_sd).hypot(wind_off),
+            by_pairs_alone: true,
             lean: None,
-        }
+        })
     }
 
     /// Whether it may be used: the registration holds, and is sure enough.
     pub fn holds(&self) -> bool {
-        self.registration.holds() && self.off_hi.is_none_or(|off| off <= LARGEST_OFF)
+        self.registration.holds() && self.off_hi <= LARGEST_OFF
     }
 
     /// Whether places of the tree at rest are less sure than the registration should be.
@@ -119,7 +138,8 @@ impl FilmFit {
         });
         Some(Self {
             registration,
-            off_hi: Some(off_hi),
+            off_hi,
+            by_pairs_alone: false,
             lean,
         })
     }
@@ -138,6 +158,10 @@ impl FilmFit {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cloud::by_pairs;
+    use crate::random::generator;
+    use crate::views::film_lines::Step;
+    use rand::RngExt;
 
     fn scan() -> Vec<WoodPiece<Point3<f64>>> {
         let stem = Point3::new(0.3, 0.1, 5.0);
@@ -210,6 +234,65 @@ mod tests {
         let unsure = FilmFit::by_lines(near, &bent, &scan(), None).expect("a fit");
         assert!(unsure.off_hi > fit.off_hi, "{unsure:?} {fit:?}");
         assert!(FilmFit::by_lines(near, &bent[..2], &scan(), None).is_none());
+    }
+
+    /// Places of the scan, and where they are in the picture.
+    fn pairs(truth: &Registration, places: &[Point3<f64>]) -> Vec<PlacePair> {
+        let pair = |at: &Point3<f64>| PlacePair {
+            film_px: truth.project(at),
+            scan: *at,
+        };
+        places.iter().map(pair).collect()
+    }
+
+    /// Of 100 draws of places that are off by what users are, those that are off by more than is said.
+    #[test]
+    fn places_are_off_by_what_pairs_say() {
+        let truth = registration(2.2, 0.01, 60.0);
+        let mut places: Vec<Point3<f64>> = scan().iter().map(|piece| piece.to).collect();
+        places.push(Point3::origin());
+        let film = filmed(&truth);
+        let lines = Lines::of(&film, &scan(), 60.0).expect("lines");
+        let exact = pairs(&truth, &places);
+        let mut chance = generator(5, 0);
+        // A uniform distribution of this standard deviation, of a tree 300 px high.
+        let most_px = 3_f64.sqrt() * PAIR_SD_SHARE * 300.0;
+        let mut beyond = 0;
+        for _ in 0..100 {
+            let mut clicked = exact.clone();
+            for pair in &mut clicked {
+                pair.film_px += Vector2::from_fn(|_, _| chance.random_range(-most_px..most_px));
+            }
+            let found = by_pairs(&clicked, 300.0).expect("a registration");
+            let fit = FilmFit::by_pairs(found, &clicked, &film, &scan(), false).expect("a fit");
+            let mut step = Step::zeros();
+            step[0] = found.turn - truth.turn;
+            step[0] -= std::f64::consts::TAU * (step[0] / std::f64::consts::TAU).round();
+            let turn = found.to_picture.isometry.rotation.angle() - 0.01;
+            step[1] = turn;
+            step[2] = (found.to_picture.scaling() / 60.0).ln();
+            let shift = found.to_picture.isometry.translation.vector;
+            (step[3], step[4]) = (shift.x, shift.y);
+            beyond += u32::from(lines.off_by(&truth, &step) > fit.off_hi);
+        }
+        assert!(beyond <= 10, "{beyond}");
+    }
+
+    #[test]
+    fn pairs_all_over_the_tree_are_surer_than_three_beside_each_other() {
+        let truth = registration(2.2, 0.01, 60.0);
+        let fit = |places: &[Point3<f64>]| {
+            let pairs = pairs(&truth, places);
+            FilmFit::by_pairs(truth, &pairs, &filmed(&truth), &scan(), false)
+        };
+        let mut tips: Vec<Point3<f64>> = scan().iter().map(|piece| piece.to).collect();
+        tips.push(Point3::origin());
+        let all = fit(&tips).expect("a fit");
+        assert!(all.off_hi < 0.02 && all.by_pairs_alone, "{all:?}");
+        let near = [[0.0, 0.0, 1.0], [0.2, 0.1, 1.0], [0.1, 0.3, 1.4]].map(Point3::from);
+        let near = fit(&near).expect("a fit");
+        assert!(near.off_hi > 0.05, "{near:?}");
+        assert!(fit(&[Point3::origin(); 4]).is_none());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The lines of a filmed tree beside those of its scan: what their pairs say of how the one lies on the
 //! other, and how surely. See [`FilmFit`](super::film_fit::FilmFit).
 
-use crate::cloud::{LinePlace, Registration, WoodPiece, places_seen, thickest};
+use crate::cloud::{LinePlace, PlacePair, Registration, WoodPiece, places_seen, thickest};
 use crate::signal::median;
 use nalgebra::{Point2, Point3, SMatrix, SVector, Similarity2, UnitComplex, Vector2};
 
@@ -27,8 +27,9 @@ pub struct FilmPiece {
 }
 
 /// Turn, roll, logarithm of the scale, and shift, px.
-pub(super) type Step = SVector<f64, 5>;
-pub(super) type Square = SMatrix<f64, 5, 5>;
+const UNKNOWNS: usize = 5;
+pub(super) type Step = SVector<f64, UNKNOWNS>;
+pub(super) type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
 pub(super) fn moved(registration: &mut Registration, step: &Step) {
     registration.turn += step[0];
@@ -40,7 +41,7 @@ pub(super) fn moved(registration: &mut Registration, step: &Step) {
 }
 
 /// How a place of the scan moves in the picture with each part of a step.
-fn moves(registration: &Registration, at: &Point3<f64>) -> SMatrix<f64, 2, 5> {
+fn moves(registration: &Registration, at: &Point3<f64>) -> SMatrix<f64, 2, UNKNOWNS> {
     let linear = registration.to_picture;
     let origin = linear * Point2::origin();
     let off = registration.project(at) - origin;
@@ -184,6 +185,35 @@ impl Lines {
             }
         }
         Some(equations)
+    }
+
+    /// What pairs miss each other by along either axis of the picture, as a share of the height: the standard
+    /// deviation of a place. `None` of fewer than three.
+    pub fn pairs_miss(&self, registration: &Registration, pairs: &[PlacePair]) -> Option<f64> {
+        let free = (2 * pairs.len())
+            .checked_sub(UNKNOWNS)
+            .filter(|free| *free > 0)?;
+        let misses = pairs
+            .iter()
+            .map(|p| (registration.project(&p.scan) - p.film_px).norm_squared());
+        Some((misses.sum::<f64>() / free as f64).sqrt() / self.height_px)
+    }
+
+    /// The covariance of the step that pairs of places ask for, whose standard deviation along either axis is this
+    /// share of the height; `None` where they do not say all of it.
+    pub fn pairs_covariance(
+        &self,
+        registration: &Registration,
+        pairs: &[PlacePair],
+        sd_share: f64,
+    ) -> Option<Square> {
+        let sd_px = sd_share * self.height_px;
+        let mut normal = Square::zeros();
+        for pair in pairs {
+            let moves = moves(registration, &pair.scan);
+            normal += moves.transpose() * moves / sd_px.powi(2);
+        }
+        normal.try_inverse()
     }
 
     /// How far a step moves the tree, root mean square, as a share of its height.

@@ -38,7 +38,10 @@ pub fn register_film(
     let mut finer =
         starts.filter_map(|start| FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)));
     let finer = finer.find(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));
-    Some(finer.unwrap_or_else(|| FilmFit::by_pairs(found)))
+    finer.or_else(|| {
+        let is_wind = upright_in_wind(film).is_some();
+        FilmFit::by_pairs(found, &pairs, &pieces, &scan, is_wind)
+    })
 }
 
 /// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree

@@ -38,14 +38,14 @@ impl FilmOnScan {
 
     /// That of a registration which lines did not make surer.
     fn unsure_warning(&self) -> Option<String> {
-        let unsure = "the film lies on the scan by its pairs alone, and nothing says how surely: the lines of film and \
-                      scan do not confirm it; more pairs, all over the tree, make it surer";
-        self.fit.off_hi.is_none().then(|| unsure.to_owned())
+        let unsure = "the film lies on the scan by its pairs alone: the lines of film and scan do not confirm it; more \
+                      pairs, all over the tree, make it surer";
+        self.fit.by_pairs_alone.then(|| unsure.to_owned())
     }
 
     /// What is not as it should be of a registration that nothing but its pairs tells.
     pub fn finding(&self) -> Option<Finding> {
-        self.fit.off_hi.is_none().then(|| Finding {
+        self.fit.by_pairs_alone.then(|| Finding {
             grade: Grade::Fair,
             reason: "the film lies on the scan by its pairs alone".to_owned(),
             advice: "give more pairs, all over the tree".to_owned(),
@@ -88,7 +88,7 @@ impl FilmOnScan {
                 .to_degrees(),
             px_per_metre: registration.to_picture.scaling(),
             shift_px: shift_px.into(),
-            off_hi: self.fit.off_hi,
+            off_hi: Some(self.fit.off_hi),
             lean_deg: self.fit.lean.map(|lean| lean.angle.to_degrees()),
             rest_off_hi: self.fit.lean.map(|lean| lean.rest_off_hi),
             miss: registration.miss,

@@ -7,6 +7,7 @@ use arborcam::document::{Document, ForestDocument};
 use arborcam::import::{CloudFormat, read_cloud, read_model};
 use arborcam::model::{NodeId, NodeKind};
 use nalgebra::{Point2, Point3, Rotation3, Vector2, Vector3};
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::BufReader;
@@ -711,6 +712,40 @@ fn each_tree_of_a_plot_becomes_a_document_at_its_place() {
     }
 }
 
+/// Pairs of places of a film and the table of its tree, as rows: what is farthest to the left, to the right, and up, and
+/// the foot.
+fn table_pairs(film: &Path, table: &Path) -> Vec<String> {
+    let number =
+        |row: &BTreeMap<String, String>, key: &str| row[key].parse::<f64>().expect("a number");
+    let (mut nodes, mut pieces) = (records(&film.join("nodes.csv")), records(table));
+    nodes.retain(|node| ["measured", "traced", "shoot"].contains(&node["kind"].as_str()));
+    pieces.retain(|piece| piece["made_up"] == "0");
+    let mut rows = vec![format!("{},{},0,0,0\n", nodes[0]["u_px"], nodes[0]["v_px"])];
+    for (px, m, sign) in [
+        ("u_px", "endX", -1.0_f64),
+        ("u_px", "endX", 1.0),
+        ("v_px", "endZ", 1.0),
+    ] {
+        // Down in the picture is down in the scan.
+        let sign_px = if px == "v_px" { -sign } else { sign };
+        nodes.sort_by(|a, b| (sign_px * number(a, px)).total_cmp(&(sign_px * number(b, px))));
+        pieces.sort_by(|a, b| (sign * number(a, m)).total_cmp(&(sign * number(b, m))));
+        let (node, piece) = (
+            nodes.last().expect("a node"),
+            pieces.last().expect("a piece"),
+        );
+        let places = [
+            &node["u_px"],
+            &node["v_px"],
+            &piece["endX"],
+            &piece["endY"],
+            &piece["endZ"],
+        ];
+        rows.push(format!("{}\n", places.map(String::as_str).join(",")));
+    }
+    rows
+}
+
 /// A film on a table of its own tree, in metres: it is found, the trunk has the film's frequency from the foot on, and so
 /// nearly every piece hangs on wood with one.
 #[test]
@@ -741,17 +776,37 @@ fn a_film_on_the_wood_of_its_own_tree_gives_it_its_frequencies() {
     let filmed: f64 = trunk["frequency_hz"].parse().expect("a number");
     assert!((on_trunk - filmed).abs() < 1e-4, "{on_trunk}, {filmed}");
     assert!(pieces.iter().all(|p| !p["nearest_frequency_hz"].is_empty()));
-    // One that lies elsewhere is refused.
-    let pairs = dir.path().join("pairs.csv");
-    fs::write(&pairs, "u_px,v_px,x,y,z\n0,0,0,0,0\n").expect("pairs");
-    let pairs = pairs.to_str().expect("name");
-    let few = arborcam(&["cloud", name, "--film", film, "--pairs", pairs], &scan);
-    let said = String::from_utf8_lossy(&few.stderr).into_owned();
-    assert_eq!(few.status.code(), Some(BAD_USAGE), "{said}");
-    assert!(
-        said.contains("three are needed") && !scan.exists(),
-        "{said}"
-    );
+    // By pairs of places it lies as well. Bad pairs are refused.
+    let rows = table_pairs(Path::new(film), &table);
+    let path = dir.path().join("pairs.csv");
+    let pairs = path.to_str().expect("name");
+    let with_pairs = [
+        "cloud", name, "--film", film, "--unit", "m", "--pairs", pairs,
+    ];
+    let write = |rows: &[String]| {
+        fs::write(&path, format!("u_px,v_px,x,y,z\n{}\n", rows.concat())).expect("pairs");
+    };
+    write(&rows);
+    let paired = dir.path().join("paired");
+    let said = done(&with_pairs, &paired);
+    assert!(said.contains("the film lies on the scan within"), "{said}");
+    let refused = |rows: &[String], status: i32, why: &str| {
+        write(rows);
+        let refused = arborcam(&with_pairs, &scan);
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(status), "{said}");
+        assert!(said.contains(why) && !scan.exists(), "{said}");
+    };
+    refused(&rows[..1], BAD_USAGE, "three are needed");
+    let same = [&rows[0], &rows[0], &rows[0]].map(String::clone);
+    refused(&same, FAILED, "--pairs");
+    let mut exchanged = rows.clone();
+    for (k, row) in exchanged.iter_mut().enumerate() {
+        let [film_px, scan_m] = [&rows[k], &rows[(k + 1) % rows.len()]]
+            .map(|row| row.split(',').map(str::to_owned).collect::<Vec<String>>());
+        *row = [&film_px[..2], &scan_m[2..]].concat().join(",");
+    }
+    refused(&exchanged, FAILED, "do not agree with each other");
 }
 
 /// Tables that contradict themselves, or hold what no tree has.
@@ -834,6 +889,10 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
     fs::create_dir(path("folder.las")).expect("folder");
     let cut = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius\n1,0,0\n";
     fs::write(path("cut.csv"), cut).expect("file");
+    let orphan = "ID,startX,startY,startZ,endX,endY,endZ,radius\n1,0,0,0,0,0,5,0.1\n";
+    fs::write(path("orphan.csv"), orphan).expect("file");
+    let tall = "ID,parentID,startX,startY,startZ,endX,endY,endZ,radius\n1,0,0,0,0,0,0,5000,100\n";
+    fs::write(path("tall.csv"), tall).expect("file");
     fs::write(path("short.las"), b"LASF and nothing more").expect("file");
     fs::write(
         path("more.ply"),
@@ -854,12 +913,26 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
         ("empty.las", FAILED, "cut off"),
         ("short.las", FAILED, "cut off"),
         ("words.las", FAILED, "it does not begin as LAS does"),
-        ("checksum.e57", FAILED, "damaged"),
+        (
+            "checksum.e57",
+            FAILED,
+            "a checksum in it does not fit its bytes",
+        ),
         ("folder.las", NO_INPUT, "it is a folder"),
         (
             "cut.csv",
             FAILED,
             "line 2: it has 3 cells, and the first line 9",
+        ),
+        (
+            "orphan.csv",
+            FAILED,
+            "a table of cylinders has columns that it has not: parentID",
+        ),
+        (
+            "tall.csv",
+            FAILED,
+            "would be 5000.000 m high; give the unit",
         ),
         ("more.ply", FAILED, "more than its header says"),
         ("tree.mov", BAD_USAGE, "its name does not say"),

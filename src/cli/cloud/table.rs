@@ -6,6 +6,7 @@ use crate::cli::example::{read_file, say_what_is_lost, unfit};
 use crate::cli::output::eprint_line;
 use crate::cli::stop::Stop;
 use crate::cli::unused;
+use crate::cloud::check_height;
 use crate::config::Config;
 use crate::document::Document;
 use crate::import::{CloudFormat, ModelTree, Units, is_wood_table, read_model};
@@ -66,6 +67,7 @@ pub fn write(
     }
     let metres = args.unit.map_or(1.0, Unit::metres);
     let tree = as_scanned(table, metres).map_err(|e| args.failed(e))?;
+    check_height(tree.figures.height_m).map_err(|e| args.failed(e))?;
     let name = args.file.file_name().unwrap_or_default();
     let scan = Scan {
         name: name.to_string_lossy().into_owned(),

@@ -48,7 +48,7 @@ fn check_header(input: &mut (impl Read + Seek)) -> Result<(), ImportError> {
 }
 
 fn read_scans<R: BufRead + Seek>(input: R, points: &mut Points) -> Result<(), ImportError> {
-    let mut file = E57Reader::new(input).map_err(ImportError::bad_format)?;
+    let mut file = E57Reader::new(input).map_err(damaged)?;
     // Its lengths are metres (ASTM E2807).
     if !points.unit_is_given {
         points.take_units(Units::METRES);
@@ -56,17 +56,23 @@ fn read_scans<R: BufRead + Seek>(input: R, points: &mut Points) -> Result<(), Im
     let scans = file.pointclouds();
     for scan in &scans {
         refuse_many(scan.records)?;
-        let mut reader = file
-            .pointcloud_simple(scan)
-            .map_err(ImportError::bad_format)?;
+        let mut reader = file.pointcloud_simple(scan).map_err(damaged)?;
         reader.spherical_to_cartesian(true);
         reader.apply_pose(true);
         for point in reader {
-            let point = point.map_err(ImportError::bad_format)?;
+            let point = point.map_err(damaged)?;
             if let CartesianCoordinate::Valid { x, y, z } = point.cartesian {
                 points.push(x, y, z)?;
             }
         }
     }
     Ok(())
+}
+
+/// What the reader found. It names bytes and pages where a checksum does not fit, which say nothing to a user.
+fn damaged(e: e57::Error) -> ImportError {
+    match e.to_string().contains("checksum") {
+        true => ImportError::bad_format("a checksum in it does not fit its bytes"),
+        false => ImportError::bad_format(e),
+    }
 }
