@@ -160,6 +160,33 @@ fn no_camera_file_and_no_list_brings_the_readers_down() {
     }
 }
 
+/// A film of two pictures with depth, whose depth image is what befell a sound one.
+#[test]
+fn no_depth_image_brings_its_film_down() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = |name: &str| folder.path().join(name);
+    let camera = r#"{"fx": 600, "fy": 600, "cx": 4, "cy": 3, "depth_unit_m": 0.001}"#;
+    fs::write(path("camera.json"), camera).expect("camera");
+    fs::write(path("rgb.txt"), "1.0 colour.png\n1.1 colour.png\n").expect("list");
+    fs::write(path("depth.txt"), "1.0 depth.png\n1.1 depth.png\n").expect("list");
+    fs::copy("fuzz/corpus/depth/colour.png", path("colour.png")).expect("picture");
+    let mut with_depth = 0;
+    let mut check = |bytes: &[u8]| {
+        fs::write(path("depth.png"), bytes).expect("depth");
+        let mut film = match source::open(folder.path(), &Config::default(), None) {
+            Ok(film) => film,
+            Err(e) => return assert!(!e.to_string().contains('\n'), "one line"),
+        };
+        let frame = film.next_frame().expect("a picture").expect("a picture");
+        with_depth += u64::from(frame.depth.is_some());
+        assert!(film.warnings().iter().all(|w| !w.contains('\n')));
+    };
+    for seed in seeds("depth") {
+        each(&seed, &mut check);
+    }
+    assert!((1..TRIES).contains(&with_depth), "{with_depth} with depth");
+}
+
 #[test]
 fn no_drawing_and_no_model_brings_the_readers_down() {
     let mut trees = 0;
