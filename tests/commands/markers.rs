@@ -259,6 +259,76 @@ fn markers_of_two_films_are_matched_by_their_names() {
     }
 }
 
+/// AprilTag 36h11, number 7: its 6 x 6 bits and the black rim.
+const TAG: [&str; 8] = [
+    "########", "###.#.##", "#...####", "##...#.#", "###.#.##", "##..####", "###.####", "########",
+];
+/// Where its black square begins, and the side of a bit, px.
+const TAG_PX: [u32; 2] = [14, 150];
+const BIT_PX: u32 = 6;
+
+/// Hangs the tag before the wall, with its white rim.
+fn hang_tag(picture: &mut RgbImage) {
+    let side = BIT_PX * TAG.len() as u32;
+    let [left, top] = TAG_PX.map(|px| px - BIT_PX);
+    for u in 0..side + 2 * BIT_PX {
+        for v in 0..side + 2 * BIT_PX {
+            // The rim is what lies beside all rows.
+            let [column, row] = [u, v].map(|x| (x / BIT_PX).wrapping_sub(1) as usize);
+            let bits = TAG.get(row).map(|bits| bits.as_bytes());
+            let is_black = bits.is_some_and(|bits| bits.get(column) == Some(&b'#'));
+            let grey = if is_black { 15 } else { 240 };
+            picture.put_pixel(left + u, top + v, Rgb([grey; 3]));
+        }
+    }
+}
+
+/// The tag gives the scale and its upright from the first frames of a film.
+#[test]
+fn a_tag_gives_the_scale_of_its_film() {
+    let scene = Scene::new(60, RED);
+    for k in 0..60 {
+        let path = scene.path(&format!("film/{k:04}.png"));
+        let mut picture = frame(k, RED);
+        hang_tag(&mut picture);
+        picture.save(path).expect("png");
+    }
+    scene.replay("markers.json --tag 0.24", "out");
+    let note = fs::read_to_string(scene.path("out/capture.json")).expect("note");
+    let note: serde_json::Value = serde_json::from_str(&note).expect("JSON");
+    let tag = &note["tag"];
+    assert_eq!(tag["id"], 7, "{tag}");
+    let [lo, scale, hi] = ["metres_per_px_lo", "metres_per_px", "metres_per_px_hi"]
+        .map(|key| tag[key].as_f64().expect("a scale"));
+    let true_scale = 0.24 / f64::from(8 * BIT_PX);
+    assert!((scale / true_scale - 1.0).abs() < 0.01, "{tag}");
+    assert!((lo..hi).contains(&true_scale), "{tag}");
+    assert!(
+        tag["roll_deg"]
+            .as_f64()
+            .is_some_and(|roll| roll.abs() < 1.0),
+        "{tag}"
+    );
+    let export = &note["config"]["export"]["metres_per_px"];
+    assert_eq!(export, &tag["metres_per_px"]);
+}
+
+/// Windows of CamShift follow as those of mean shift do.
+#[test]
+fn camshift_tells_the_same_frequencies() {
+    let scene = Scene::new(FRAMES, RED);
+    scene.write("camshift.toml", "[markers]\nmethod = \"camshift\"\n");
+    scene.replay("markers.json --config camshift.toml", "out");
+    let found = branches(&scene, "out --markers");
+    for (branch, hz) in found.iter().zip([TRUNK_HZ, BRANCH_HZ]) {
+        let value = branch["frequency_hz"]["value"]
+            .as_f64()
+            .expect("a frequency");
+        assert!((value / hz - 1.0).abs() < 0.01, "{value} for {hz}");
+    }
+    assert_eq!(found.len(), 2);
+}
+
 #[test]
 fn a_lens_and_the_time_of_rows_change_what_is_told() {
     let scene = Scene::new(60, RED);
