@@ -15,7 +15,7 @@ mod settings;
 
 pub use depth_camera::{DepthCamera, check_distortion};
 pub use load::{ConfigError, STROKE_POINTS, check_strokes};
-pub use markers::{MAX_MARKERS, MarkerCorrection, MarkerWindow, check_marker_parents};
+pub use markers::{MAX_MARKERS, MarkerCorrection, MarkerWindow, check_marker_names};
 pub use reference::{default_file, help, range, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};

@@ -233,6 +233,7 @@ fn analyse_capture(
     if let Some(cut) = cut_off(&filmed, document).filter(|_| args.to.is_none()) {
         notes.add("warning", cut);
     }
+    camera.refuse_long_readout(&filmed)?;
     let take = Take::of(camera.film(&filmed));
     if let Some(warning) = take.warning() {
         notes.add("warning", warning);
@@ -309,6 +310,9 @@ fn analyse_capture(
     })
 }
 
+/// A frame is read within this share of the time to the next: times of frames jitter.
+const LONGEST_READOUT: f64 = 1.1;
+
 /// What a camera does to the points that it films, and is undone here.
 struct Optics {
     lens: Option<Lens>,
@@ -339,6 +343,23 @@ impl Optics {
             readout_s: args.readout_ms.map_or(profile_s, |ms| ms / 1000.0),
             height_px: f64::from(size.height),
         })
+    }
+
+    /// A frame is read before the next one begins.
+    ///
+    /// # Errors
+    /// The rows are said to take longer.
+    fn refuse_long_readout(&self, film: &Film) -> Result<(), CommandError> {
+        let step_s = film.step_s();
+        if step_s == 0.0 || self.readout_s <= LONGEST_READOUT * step_s {
+            return Ok(());
+        }
+        Err(CommandError::BadUsage(anyhow!(
+            "a frame cannot be read in {:.1} ms, for the next comes after {:.1} ms; give --readout-ms of this mode of \
+             the camera",
+            1000.0 * self.readout_s,
+            1000.0 * step_s
+        )))
     }
 
     /// What is said of it; `None` where nothing is undone.

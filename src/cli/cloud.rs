@@ -345,7 +345,18 @@ impl CloudArgs {
             .map_or(Vector3::zeros(), |n| n.position.coords)
             + scan.cloud.origin;
         let mut pairs = self.pairs.clone();
+        let picture = film.skeleton.image_size;
         for pair in pairs.iter_mut().flat_map(|pairs| &mut pairs.0) {
+            let at = pair.film_px;
+            let [width, height] = [picture.width, picture.height].map(f64::from);
+            if !((0.0..=width).contains(&at.x) && (0.0..=height).contains(&at.y)) {
+                return Err(CommandError::Failed(anyhow!(
+                    "--pairs: {}, {} lies off the picture of the film, {picture}; give places in px from the left and \
+                     from the top",
+                    at.x,
+                    at.y
+                )));
+            }
             let given = pair.scan;
             pair.scan = scan.metres(&given) - foot;
             if !is_at(tree, &pair.scan) {
@@ -377,7 +388,12 @@ impl CloudArgs {
             &fit.registration,
         );
         let has_tag = film.note.tag.is_some();
-        Ok(FilmOnScan { fit, sway, has_tag })
+        Ok(FilmOnScan {
+            fit,
+            sway,
+            has_tag,
+            film_metres_per_px: film.note.config.export.metres_per_px,
+        })
     }
 }
 
@@ -406,13 +422,22 @@ fn lies_on(fit: &FilmFit) -> String {
 
 /// Why a film does not lie on its scan by the pairs of a user.
 fn pairs_say_too_little(fit: Option<&FilmFit>) -> String {
+    let elsewhere = fit.and_then(|fit| fit.elsewhere_off_hi);
+    if let Some(off_hi) = elsewhere {
+        return format!(
+            "the lines of film and scan lie on each other within {:.1} % of the height, and not where --pairs has them; \
+             check the pairs, or leave them out",
+            100.0 * off_hi
+        );
+    }
     match fit.filter(|fit| fit.registration.holds()) {
         Some(fit) => format!(
             "the lines of film and scan do not confirm the pairs of --pairs, and these alone leave places off by up to \
              {:.1} % of the height, where 2 % are allowed; give more, all over the tree",
             100.0 * fit.off_hi
         ),
-        None => "the pairs of --pairs do not agree with each other, or lie on one line; check them, or give more"
+        None => "the pairs of --pairs do not agree with each other, lie on one line, or show the tree in a size or a roll \
+                 that no film has; check them, or give more"
             .to_owned(),
     }
 }

@@ -3,7 +3,7 @@
 use super::command_error::CommandError;
 use super::common::parse_within;
 use crate::config::{Config, MarkerCorrection, MarkerWindow, Markers};
-use crate::files::{LARGEST_NOTE, read_bounded};
+use crate::files::{LARGEST_NOTE, read_bounded, without_byte_order_mark};
 use crate::markers::check_places;
 use crate::model::Size;
 use anyhow::anyhow;
@@ -126,7 +126,8 @@ impl MarkerFile {
     }
 
     fn of_json(bytes: &[u8]) -> Result<Self, String> {
-        let file: Self = serde_json::from_slice(bytes)
+        let text = String::from_utf8_lossy(bytes);
+        let file: Self = serde_json::from_str(without_byte_order_mark(&text))
             .map_err(|e| format!("{e}; it must hold width, height and markers"))?;
         if file.markers.is_empty() {
             return Err("it holds no markers".into());
@@ -149,6 +150,8 @@ mod tests {
             "markers": [{"name": "A", "window_px": [1, 2, 16, 16]},
                         {"name": "B", "window_px": [9, 2, 16, 16], "parent": "A"}],
             "corrections": [{"marker": "B", "frame": 12, "at_px": [20.5, 9]}]}"#;
+        // As some editors of Windows write it.
+        let text = format!("\u{feff}{text}");
         let file = MarkerFile::of_json(text.as_bytes()).expect("markers");
         let args = MarkerArgs {
             markers: Some(MarkerSpec::Given(file)),

@@ -208,9 +208,14 @@ impl Growth<'_> {
         }
     }
 
-    fn has_child_at(&self, node: usize, at: &Point3<f64>) -> bool {
-        let mut children = self.children[node].iter();
-        children.any(|c| (self.tree.nodes[*c as usize].at - at).norm() < SAME_CHILD * self.step)
+    /// Whether a node has a child at a place and on the way along a middle. One beside it on another way draws
+    /// nothing of this.
+    fn has_child_at(&self, node: usize, at: &Point3<f64>, middle: u32) -> bool {
+        self.children[node].iter().any(|child| {
+            let child = *child as usize;
+            let apart = (self.tree.nodes[child].at - at).norm();
+            apart < SAME_CHILD * self.step && self.at_middle[child] == middle
+        })
     }
 
     /// What draws each node, for each branch that parts from the middle where it is.
@@ -270,8 +275,8 @@ impl Growth<'_> {
                 continue;
             };
             let at = self.tree.nodes[node].at + along * self.step;
-            if !self.has_child_at(node, &at) {
-                let middle = self.middle_near(&at, self.at_middle[node], pull.to);
+            let middle = self.middle_near(&at, self.at_middle[node], pull.to);
+            if !self.has_child_at(node, &at, middle) {
                 self.add(Some(node), at, middle);
             }
         }
@@ -332,6 +337,28 @@ mod tests {
             farthest = farthest.max(tree.nodes[node].at.x);
         }
         assert!((11.0..15.0).contains(&farthest), "{farthest}");
+    }
+
+    /// Two limbs that leave one node side by side: the second one was taken for the first, and not grown.
+    #[test]
+    fn limbs_that_part_slowly_are_both_grown() {
+        let trunk = (0..20).map(|i| Point3::new(0.0, 0.0, i as f32));
+        let limb = |side: f32| {
+            (0..40).map(move |i| {
+                let way = i as f32;
+                Point3::new(side * (0.02 + 0.01 * way * way), 0.0, 20.0 + way)
+            })
+        };
+        let points: Vec<Point3<f32>> = trunk.chain(limb(-1.0)).chain(limb(1.0)).collect();
+        let mut middles = RawTree::default();
+        for (i, at) in points.iter().enumerate() {
+            let parent = if i == 60 { Some(19) } else { i.checked_sub(1) };
+            let at = at.cast();
+            middles.nodes.push(RawNode { parent, at });
+            middles.of_point.push(i as u32);
+        }
+        let tree = colonise(&middles, &points, Point3::origin(), 1.0);
+        assert!(tree.of_point.iter().all(|node| *node != u32::MAX));
     }
 
     /// A gap that the ways lead over ended the growth: a tree of 6.5 m was 0.4 m high.

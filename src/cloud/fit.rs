@@ -22,9 +22,9 @@ const LARGE_SHARE: f64 = 0.15;
 const THICKEST_QUANTILE: f64 = 0.98;
 
 /// The share of the points that lie on the wood. `points` are the thinned ones, `cell` is their distance,
-/// m.
-pub(super) fn on_wood(paths: &[Path], points: &[Point3<f32>], cell: f64) -> f64 {
-    let (mut near, mut all) = (0_usize, 0_usize);
+/// m; so many of them hang together with the foot, also where no path has them.
+pub(super) fn on_wood(paths: &[Path], points: &[Point3<f32>], cell: f64, hanging: usize) -> f64 {
+    let mut near = 0_usize;
     for path in paths {
         for (k, place) in path.places.iter().enumerate() {
             let along = path.direction(k);
@@ -36,10 +36,9 @@ pub(super) fn on_wood(paths: &[Path], points: &[Point3<f32>], cell: f64) -> f64 
                 let from_line = from_place.cross(&along).norm();
                 near += usize::from((from_line - place.radius).abs() <= most);
             }
-            all += place.points.len();
         }
     }
-    near as f64 / all.max(1) as f64
+    near as f64 / hanging.max(1) as f64
 }
 
 /// How thick the foot of the trunk is against the thickest wood. A tree is thickest there; what
@@ -118,13 +117,15 @@ mod tests {
     fn points_round_the_wood_lie_on_it_and_others_do_not() {
         let (path, mut points) = upright(&[0.1; 20]);
         let paths = [path];
-        assert_eq!(on_wood(&paths, &points, 0.01), 1.0);
+        assert_eq!(on_wood(&paths, &points, 0.01, 80), 1.0);
+        // A limb that no path has.
+        assert_eq!(on_wood(&paths, &points, 0.01, 100), 0.8);
         for point in points.iter_mut().step_by(4) {
             point.x = 0.15;
         }
-        assert_eq!(on_wood(&paths, &points, 0.01), 0.75);
+        assert_eq!(on_wood(&paths, &points, 0.01, 80), 0.75);
         // Points that are one in so coarse a cell are known no better.
-        assert_eq!(on_wood(&paths, &points, 0.12), 1.0);
+        assert_eq!(on_wood(&paths, &points, 0.12, 80), 1.0);
     }
 
     #[test]

@@ -231,7 +231,8 @@ fn tree_of(
     figures.noise_m = noise;
     figures.twig_radius_m = radius::twig_radius(&paths, noise, options.twig_radius_m);
     radius::assign(&mut paths, figures.twig_radius_m);
-    figures.on_wood = fit::on_wood(&paths, points, f64::from(cell));
+    let hanging = points.len() - figures.apart;
+    figures.on_wood = fit::on_wood(&paths, points, f64::from(cell), hanging);
     let nodes = tree::assemble(&paths, f64::from(cell));
     let Some(first) = nodes.first() else {
         return Err(CloudError::NoTree);

@@ -85,12 +85,24 @@ impl Registration {
         mean.sqrt() <= LARGEST_PAIR_MISS * height_px
     }
 
-    /// Whether it holds: it misses by little, and no other side of the tree fits nearly as well.
+    /// Whether it holds: it misses by little, and no other side of the tree fits nearly as well. By pairs the camera
+    /// is not rolled by more than by lines.
     pub fn holds(&self) -> bool {
         match self.other_side_miss {
             Some(other) => self.miss <= LARGEST_MISS && other >= LEAST_CONTRAST * self.miss,
-            None => self.miss <= LARGEST_PAIR_MISS,
+            None => self.miss <= LARGEST_PAIR_MISS && self.is_upright(),
         }
+    }
+
+    /// Whether the camera is rolled by no more than a film is looked for with.
+    fn is_upright(&self) -> bool {
+        self.to_picture.isometry.rotation.angle().abs() <= LARGEST_ROLL
+    }
+
+    /// Whether a tree so high, m, is about as high in the picture as that of a film, px.
+    pub fn fits_height(&self, height_m: f64, height_px: f64) -> bool {
+        let factor = self.to_picture.scaling() * height_m / height_px;
+        (1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
     }
 }
 

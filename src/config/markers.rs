@@ -41,7 +41,7 @@ pub struct MarkerCorrection {
 /// Refuses markers that cannot be followed, and corrections of markers that there are not.
 ///
 /// # Errors
-/// A name is empty or there twice, a window is too small or too large, a parent or the marker of a
+/// A name is empty, there twice, or no line of text, a window is too small or too large, a parent or the marker of a
 /// correction is not among them, parents form a ring, a number is not finite, or there are too many.
 pub(super) fn check(
     windows: &[MarkerWindow],
@@ -54,12 +54,13 @@ pub(super) fn check(
         )));
     }
     windows.iter().try_for_each(check_window)?;
-    check_marker_parents(windows)?;
+    check_marker_names(windows)?;
     if corrections.len() > MAX_CORRECTIONS {
         return Err(refused(format!(
             "more than {MAX_CORRECTIONS} corrections are given"
         )));
     }
+    let mut places = BTreeSet::new();
     for correction in corrections {
         let name = &correction.marker;
         if !windows.iter().any(|window| window.name == *name) {
@@ -70,6 +71,12 @@ pub(super) fn check(
         if !correction.at_px.iter().all(|x| x.is_finite()) {
             return Err(refused(format!(
                 "a correction of marker {name} is no place"
+            )));
+        }
+        let frame = correction.frame;
+        if !places.insert((name, frame)) {
+            return Err(refused(format!(
+                "marker {name} has two corrections in frame {frame}"
             )));
         }
     }
@@ -92,12 +99,17 @@ fn check_window(window: &MarkerWindow) -> Result<(), ConfigError> {
 /// Checks that markers have names of their own, and that their parents are markers and lead to the foot.
 ///
 /// # Errors
-/// A name is empty or there twice, a parent is no marker, or they form a ring.
-pub fn check_marker_parents(windows: &[MarkerWindow]) -> Result<(), ConfigError> {
+/// A name is empty, there twice, or no line of text, a parent is no marker, or they form a ring.
+pub fn check_marker_names(windows: &[MarkerWindow]) -> Result<(), ConfigError> {
     let names: BTreeSet<&str> = windows.iter().map(|w| w.name.as_str()).collect();
     if names.len() < windows.len() || names.contains("") {
         return Err(refused(
             "markers must have names, each a name of its own".into(),
+        ));
+    }
+    if names.iter().any(|name| name.contains(char::is_control)) {
+        return Err(refused(
+            "names of markers must be text without line breaks and tabs".into(),
         ));
     }
     for window in windows {
@@ -186,6 +198,10 @@ mod tests {
         }
         assert_eq!(why(&tree, &[at("B", 4.0)]), "");
         let twice = [window("A", None), window("A", None)];
-        assert!(check_marker_parents(&twice).is_err());
+        assert!(check_marker_names(&twice).is_err());
+        let both = why(&tree, &[at("B", 4.0), at("B", 5.0)]);
+        assert!(both.contains("two corrections in frame 3"), "{both}");
+        let lines = why(&[window("A\nB", None)], &[]);
+        assert!(lines.contains("without line breaks"), "{lines}");
     }
 }

@@ -124,7 +124,8 @@ impl WithDepth {
         let has_depth = frame.depth.is_some();
         self.given += 1;
         self.with_depth += u64::from(has_depth);
-        self.tally.frame(frame.sensor_time_s, has_depth);
+        self.tally
+            .frame(frame.sensor_time_s, frame.depth.as_deref());
         let counts = change(&self.shared, |counts| {
             counts.frames_without += u64::from(!has_depth);
         });

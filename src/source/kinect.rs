@@ -240,8 +240,8 @@ impl Source for Kinect {
         loop {
             if let Some(frame) = self.ready() {
                 self.waiting -= 1;
-                let has_depth = frame.depth.is_some();
-                self.tally.frame(frame.sensor_time_s, has_depth);
+                self.tally
+                    .frame(frame.sensor_time_s, frame.depth.as_deref());
                 return Ok(Some(frame));
             }
             if self.colour_ended && self.waiting == 0 {

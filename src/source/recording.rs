@@ -213,7 +213,8 @@ impl Source for Recording {
             frame.depth = depth.and_then(|depth| self.usable(depth));
         }
         if let (Some(frame), true) = (&frame, self.depth.is_some()) {
-            self.tally.frame(frame.sensor_time_s, frame.depth.is_some());
+            self.tally
+                .frame(frame.sensor_time_s, frame.depth.as_deref());
         }
         Ok(frame)
     }

@@ -190,7 +190,7 @@ impl Source for RgbdFolder {
         }
         let depth = self.depth(k);
         if self.known.is_some() {
-            self.tally.frame(time_s, depth.is_some());
+            self.tally.frame(time_s, depth.as_deref());
         }
         self.next += 1;
         Ok(Some(RawFrame {

@@ -40,6 +40,8 @@ pub struct FilmFit {
     pub off_hi: f64,
     /// Whether nothing but pairs of places says it: lines do not agree.
     pub by_pairs_alone: bool,
+    /// By how much places are off where lines show another place than the pairs; `None` where they show none.
+    pub elsewhere_off_hi: Option<f64>,
     /// Of a film in wind.
     pub lean: Option<Lean>,
 }
@@ -65,7 +67,8 @@ pub enum Upright {
 
 impl FilmFit {
     /// Of a registration by pairs of places alone, by the covariance of least squares. `is_wind` says whether the tree
-    /// was filmed in wind. `None` where the places say too little, as on one line.
+    /// was filmed in wind. `None` where the places say too little, as on one line, or make the tree much larger or
+    /// smaller than that of the film.
     pub fn by_pairs(
         registration: Registration,
         pairs: &[PlacePair],
@@ -74,6 +77,10 @@ impl FilmFit {
         is_wind: bool,
     ) -> Option<Self> {
         let lines = Lines::of(film, scan, registration.to_picture.scaling())?;
+        let tops = scan.iter().map(|piece| piece.to.z);
+        if !lines.fits_height(&registration, tops.fold(0.0, f64::max)) {
+            return None;
+        }
         let sd_share = lines.pairs_miss(&registration, pairs)?.max(PAIR_SD_SHARE);
         let covariance = lines.pairs_covariance(&registration, pairs, sd_share)?;
         let off_sd = lines.spread(&registration, &covariance);
@@ -82,13 +89,14 @@ impl FilmFit {
             registration,
             off_hi: (SDS * off_sd).hypot(wind_off),
             by_pairs_alone: true,
+            elsewhere_off_hi: None,
             lean: None,
         })
     }
 
     /// Whether it may be used: the registration holds, and is sure enough.
     pub fn holds(&self) -> bool {
-        self.registration.holds() && self.off_hi <= LARGEST_OFF
+        self.registration.holds() && self.off_hi <= LARGEST_OFF && self.elsewhere_off_hi.is_none()
     }
 
     /// Whether places of the tree at rest are less sure than the registration should be.
@@ -140,6 +148,7 @@ impl FilmFit {
             registration,
             off_hi,
             by_pairs_alone: false,
+            elsewhere_off_hi: None,
             lean,
         })
     }

@@ -187,6 +187,11 @@ impl Lines {
         Some(equations)
     }
 
+    /// Whether a scan so high, m, is about as high in the picture as the film.
+    pub fn fits_height(&self, registration: &Registration, height_m: f64) -> bool {
+        registration.fits_height(height_m, self.height_px)
+    }
+
     /// What pairs miss each other by along either axis of the picture, as a share of the height: the standard
     /// deviation of a place. `None` of fewer than three.
     pub fn pairs_miss(&self, registration: &Registration, pairs: &[PlacePair]) -> Option<f64> {

@@ -33,15 +33,22 @@ pub fn register_film(
     // Three pairs are six numbers for five unknowns; lines say more, and how sure it is. Where the pairs
     // are from a tree in wind they may lead to another side of it.
     let scan = scan_wood(tree);
-    let by_itself = std::iter::once_with(|| by_lines(&wood, &scan)).flatten();
-    let starts = std::iter::once(found).chain(by_itself);
-    let mut finer =
-        starts.filter_map(|start| FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)));
-    let finer = finer.find(|fit| fit.holds() && fit.registration.agrees_with(&pairs, height_px));
-    finer.or_else(|| {
-        let is_wind = upright_in_wind(film).is_some();
-        FilmFit::by_pairs(found, &pairs, &pieces, &scan, is_wind)
-    })
+    let finer = |start| {
+        FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)).filter(FilmFit::holds)
+    };
+    let agrees = |fit: &FilmFit| fit.registration.agrees_with(&pairs, height_px);
+    if let Some(fit) = finer(found).filter(agrees) {
+        return Some(fit);
+    }
+    if let Some(fit) = by_lines(&wood, &scan).and_then(finer) {
+        let elsewhere_off_hi = (!agrees(&fit)).then_some(fit.off_hi);
+        return Some(FilmFit {
+            elsewhere_off_hi,
+            ..fit
+        });
+    }
+    let is_wind = upright_in_wind(film).is_some();
+    FilmFit::by_pairs(found, &pairs, &pieces, &scan, is_wind)
 }
 
 /// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree

@@ -12,6 +12,9 @@ use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
+/// Sizes of a tree by film and by scan differ by no more than this factor: a height that was guessed is off by some
+/// percent.
+const LARGEST_RATIO: f64 = 1.2;
 /// Less than this is written as none, degrees.
 const LEAST_LEAN_DEG: f64 = 0.05;
 
@@ -23,6 +26,8 @@ pub struct FilmOnScan {
     pub sway: Vec<Swaying>,
     /// A tag was seen in the film.
     pub has_tag: bool,
+    /// As the film knows it; 0 where it does not.
+    pub film_metres_per_px: f64,
 }
 
 impl FilmOnScan {
@@ -33,7 +38,24 @@ impl FilmOnScan {
 
     /// What the user should know before trusting it.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
-        self.lean_warning().into_iter().chain(self.unsure_warning())
+        let warnings = [
+            self.size_warning(),
+            self.lean_warning(),
+            self.unsure_warning(),
+        ];
+        warnings.into_iter().flatten()
+    }
+
+    /// The warning where film and scan have the tree in two sizes.
+    fn size_warning(&self) -> Option<String> {
+        let times = self.fit.registration.to_picture.scaling() * self.film_metres_per_px;
+        let is_other = times > 0.0 && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times);
+        is_other.then(|| {
+            format!(
+                "by its own scale the film has the tree {times:.2} times as large as the scan; check the unit of the scan \
+                 (--unit) and the scale of the film, or it is another tree"
+            )
+        })
     }
 
     /// That of a registration which lines did not make surer.
@@ -172,5 +194,38 @@ fn scan_note(cloud: &PointCloud, tree: &CloudTree) -> ScanNote {
         clear_stem: figures.clear_stem,
         fork_below: figures.fork_below,
         film: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Registration;
+    use nalgebra::{Similarity2, Vector2};
+
+    #[test]
+    fn a_film_of_another_size_than_its_scan_is_named() {
+        let film_of = |film_metres_per_px| FilmOnScan {
+            fit: FilmFit {
+                registration: Registration {
+                    turn: 0.0,
+                    to_picture: Similarity2::new(Vector2::zeros(), 0.0, 50.0),
+                    miss: 0.005,
+                    other_side_miss: Some(0.02),
+                },
+                off_hi: 0.01,
+                by_pairs_alone: false,
+                elsewhere_off_hi: None,
+                lean: None,
+            },
+            sway: Vec::new(),
+            has_tag: false,
+            film_metres_per_px,
+        };
+        for same in [0.0, 0.018, 0.022] {
+            assert_eq!(film_of(same).warnings().count(), 0, "{same}");
+        }
+        let said: Vec<String> = film_of(0.0656).warnings().collect();
+        assert!(said[0].contains("3.28 times as large"), "{said:?}");
     }
 }

@@ -806,7 +806,18 @@ fn a_film_on_the_wood_of_its_own_tree_gives_it_its_frequencies() {
             .map(|row| row.split(',').map(str::to_owned).collect::<Vec<String>>());
         *row = [&film_px[..2], &scan_m[2..]].concat().join(",");
     }
-    refused(&exchanged, FAILED, "do not agree with each other");
+    // Where the lines say better.
+    refused(&exchanged, FAILED, "and not where --pairs has them");
+    let off = [
+        "9999,10,0,0,0\n".to_owned(),
+        rows[0].clone(),
+        rows[1].clone(),
+    ];
+    refused(&off, FAILED, "lies off the picture of the film");
+    // Of the same table in feet, by a film that knows its metres.
+    let scaled = dir.path().join("film");
+    let said = done(&["cloud", name, "--film", film, "--unit", "ft"], &scaled);
+    assert!(!said.contains("times as large"), "{said}");
 }
 
 /// Tables that contradict themselves, or hold what no tree has.

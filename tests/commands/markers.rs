@@ -345,6 +345,13 @@ fn a_lens_and_the_time_of_rows_change_what_is_told() {
     for what in ["where no lens distorts (lens.json)", "within 20.0 ms"] {
         assert!(said(&output).contains(what), "{}", said(&output));
     }
+    let long = scene.run("analyze out --markers --readout-ms 200");
+    assert_eq!(long.status.code(), Some(BAD_USAGE));
+    assert!(
+        said(&long).contains("the next comes after"),
+        "{}",
+        said(&long)
+    );
     let straight = branches(&scene, "out --markers --lens lens.json");
     let end = |found: &[serde_json::Value]| found[1]["end_px"][0].as_f64().expect("a place");
     assert!((end(&plain) - end(&straight)).abs() > 0.5);
@@ -355,6 +362,21 @@ fn a_lens_and_the_time_of_rows_change_what_is_told() {
         "{}",
         said(&endless)
     );
+}
+
+/// The page shows names as they are, and is not made of them.
+#[test]
+fn names_of_markers_are_no_part_of_the_page() {
+    let scene = Scene::new(60, RED);
+    let [a, b] = markers_px(0);
+    let carried = window("<b>B", b, r#", "parent": "<i>&A""#);
+    scene.markers(&format!("{}, {carried}", window("<i>&A", a, "")));
+    scene.replay("markers.json", "out");
+    let output = scene.run("analyze out --markers --report page.html");
+    assert!(output.status.success(), "{}", said(&output));
+    let page = fs::read_to_string(scene.path("page.html")).expect("a page");
+    assert!(page.contains("&lt;b&gt;B") && page.contains("&lt;i&gt;&amp;A"));
+    assert!(!page.contains("<b>B") && !page.contains("<i>&A"));
 }
 
 #[test]

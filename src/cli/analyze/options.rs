@@ -5,7 +5,7 @@ use super::super::common::{moment, parse_within};
 use super::super::markers::MarkerFile;
 use super::super::scale::ScaleArgs;
 use crate::bounds::Bounds;
-use crate::config::{Config, ConfigError, Excited, MarkerWindow, check_marker_parents};
+use crate::config::{Config, ConfigError, Excited, MarkerWindow, check_marker_names};
 use crate::files::{LARGEST_NOTE, read_bounded};
 use crate::import::read_lens_profile;
 use crate::model::Lens;
@@ -143,7 +143,7 @@ impl FromStr for MarkerParents {
 
     fn from_str(path: &str) -> Result<Self, String> {
         let markers = MarkerFile::read(path)?.markers;
-        check_marker_parents(&markers).map_err(|e| e.to_string())?;
+        check_marker_names(&markers).map_err(|e| e.to_string())?;
         Ok(Self(markers))
     }
 }

@@ -1,7 +1,7 @@
 //! The table of `--pairs`: places that are the same in film and scan.
 
 use crate::cloud::PlacePair;
-use crate::files::read_bounded;
+use crate::files::{read_bounded, without_byte_order_mark};
 use nalgebra::{Point2, Point3};
 use std::path::Path;
 
@@ -19,7 +19,7 @@ pub fn read_pairs(path: &str) -> Result<Pairs, String> {
         read_bounded(Path::new(path), LARGEST_PAIRS).map_err(|e| format!("{e}; give a table"))?;
     let text = String::from_utf8_lossy(&bytes);
     let mut lines = (1..)
-        .zip(text.lines().map(str::trim))
+        .zip(without_byte_order_mark(&text).lines().map(str::trim))
         .filter(|(_, line)| !line.is_empty());
     if lines
         .next()

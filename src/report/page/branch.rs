@@ -16,7 +16,7 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
         .parent
         .map_or("on the foot".into(), |p| format!("carried by {p}"));
     let id = escaped(&anchor(study, branch));
-    let head = format!("Branch {}, {}, {of}", branch.name, branch.piece);
+    let head = format!("Branch {}, {}, {of}", branch.name, escaped(&branch.piece));
     match branch.sway {
         Ok(sway) => {
             let damping = sway
@@ -36,7 +36,7 @@ pub fn branch_part(study: &Study, branch: &Branch) -> String {
         Err(_) => {
             format!(
                 "<details id=\"{id}\"><summary>{head}: {}</summary>{}</details>",
-                branch.why().unwrap_or_default(),
+                escaped(&branch.why().unwrap_or_default()),
                 plots(study, branch)
             )
         }

@@ -2,6 +2,7 @@
 
 use super::{cells, stacked};
 use crate::model::Unidentified;
+use crate::report::plot::escaped;
 use crate::report::study::{Branch, Study};
 use crate::report::values::{interval, number};
 use crate::report::words;
@@ -44,7 +45,7 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
         format!("<a href=\"#{}\">{}</a>", anchor(study, branch), branch.name)
     };
     let place = [branch.level.to_string(), parent, branch.points.to_string()];
-    let first = cells("td", "n", &[name, branch.piece.clone()]) + &cells("td", "n less", &place);
+    let first = cells("td", "n", &[name, escaped(&branch.piece)]) + &cells("td", "n less", &place);
     let reference = [
         number(branch.reference.map_or(f64::NAN, |r| r.peak_hz), 2),
         number(branch.reference.map_or(f64::NAN, |r| r.damping_ratio), 3),
@@ -54,7 +55,7 @@ fn row(study: &Study, branch: &Branch, columns: usize) -> String {
         Err(_) => format!(
             "<td class=\"why\" colspan=\"{}\"><span>none: {}</span></td>",
             columns - 7,
-            branch.why().unwrap_or_default()
+            escaped(&branch.why().unwrap_or_default())
         ),
         Ok(sway) => {
             let mut rest = vec![
