@@ -85,9 +85,11 @@ impl FilmFit {
         let covariance = lines.pairs_covariance(&registration, pairs, sd_share)?;
         let off_sd = lines.spread(&registration, &covariance);
         let wind_off = if is_wind { WIND_OFF_SHARE } else { 0.0 };
-        Some(Self {
+        let off_hi = (SDS * off_sd).hypot(wind_off);
+        // Of places on one line the covariance may be no number.
+        off_hi.is_finite().then_some(Self {
             registration,
-            off_hi: (SDS * off_sd).hypot(wind_off),
+            off_hi,
             by_pairs_alone: true,
             elsewhere_off_hi: None,
             lean: None,
