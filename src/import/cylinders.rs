@@ -120,7 +120,7 @@ impl Columns {
         });
         let fewest = missing.into_iter().min_by_key(Vec::len).unwrap_or_default();
         Err(ImportError::bad_format(format!(
-            "a table of cylinders has columns that it has not: {}",
+            "it has no column {}, and is no table of cylinders",
             fewest.join(", ")
         )))
     }
