@@ -36,6 +36,8 @@ const MAX_PART_S: f64 = 600.0;
 const LEAST_CUT_S: f64 = 1.0;
 /// A marker that was seen in less than this share of the frames is named.
 const SELDOM_SEEN: f64 = 0.5;
+/// A frame is read within this share of the time to the next: times of frames jitter.
+const LONGEST_READOUT: f64 = 1.1;
 
 /// The analysis of one capture.
 struct CaptureAnalysis {
@@ -309,9 +311,6 @@ fn analyse_capture(
         study,
     })
 }
-
-/// A frame is read within this share of the time to the next: times of frames jitter.
-const LONGEST_READOUT: f64 = 1.1;
 
 /// What a camera does to the points that it films, and is undone here.
 struct Optics {

@@ -20,7 +20,8 @@ use crate::model::{PointCloud, Verdict};
 use crate::outline;
 use crate::pipeline::stand_scanned;
 use crate::views::{
-    DrawnTree, FilmFit, FilmOnScan, filmed_points, register_film, scan_defaults, sway_on_scan,
+    DrawnTree, FilmFit, FilmOnScan, Grounds, filmed_points, register_film, scan_defaults,
+    sway_on_scan,
 };
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
@@ -422,22 +423,19 @@ fn lies_on(fit: &FilmFit) -> String {
 
 /// Why a film does not lie on its scan by the pairs of a user.
 fn pairs_say_too_little(fit: Option<&FilmFit>) -> String {
-    let elsewhere = fit.and_then(|fit| fit.elsewhere_off_hi);
-    if let Some(off_hi) = elsewhere {
-        return format!(
-            "the lines of film and scan lie on each other within {:.1} % of the height, and not where --pairs has them; \
-             check the pairs, or leave them out",
-            100.0 * off_hi
-        );
-    }
     match fit.filter(|fit| fit.registration.holds()) {
+        Some(fit) if fit.grounds == Grounds::LinesAgainstPairs => format!(
+            "the lines of film and scan lie on each other within {:.1} % of the height, and not where --pairs has \
+             them; check the pairs, or leave them out",
+            100.0 * fit.off_hi
+        ),
         Some(fit) => format!(
             "the lines of film and scan do not confirm the pairs of --pairs, and these alone leave places off by up to \
              {:.1} % of the height, where 2 % are allowed; give more, all over the tree",
             100.0 * fit.off_hi
         ),
-        None => "the pairs of --pairs do not agree with each other, lie on one line, or show the tree in a size or a roll \
-                 that no film has; check them, or give more"
+        None => "the pairs of --pairs do not agree with each other, lie on one line, or show the tree in a size or a \
+                 roll that no film has; check them, or give more"
             .to_owned(),
     }
 }

@@ -299,6 +299,19 @@ mod tests {
         grown(points, &middle_of, &middles, Point3::origin(), 1.0)
     }
 
+    /// A middle at each point.
+    fn middles_at(points: &[Point3<f32>], parent: impl Fn(usize) -> Option<usize>) -> RawTree {
+        let mut middles = RawTree::default();
+        for (i, at) in points.iter().enumerate() {
+            middles.nodes.push(RawNode {
+                parent: parent(i),
+                at: at.cast(),
+            });
+            middles.of_point.push(i as u32);
+        }
+        middles
+    }
+
     /// Two points drew one node for ever to and fro between them in the loop as printed.
     #[test]
     fn growth_ends_and_reaches_what_it_can() {
@@ -322,13 +335,12 @@ mod tests {
             Point3::new(1.0 + 12.0 * angle.sin(), 0.0, 32.0 - 12.0 * angle.cos())
         });
         let points: Vec<Point3<f32>> = trunk.chain(bow).collect();
-        let mut middles = RawTree::default();
-        for (i, at) in points.iter().enumerate() {
-            let parent = if i == 60 { Some(20) } else { i.checked_sub(1) };
-            let at = at.cast();
-            middles.nodes.push(RawNode { parent, at });
-            middles.of_point.push(i as u32);
-        }
+        let middles = middles_at(
+            &points,
+            |i| {
+                if i == 60 { Some(20) } else { i.checked_sub(1) }
+            },
+        );
         let tree = colonise(&middles, &points, Point3::origin(), 1.0);
         let mut node = tree.of_point[points.len() - 1] as usize;
         let mut farthest: f64 = 0.0;
@@ -350,13 +362,12 @@ mod tests {
             })
         };
         let points: Vec<Point3<f32>> = trunk.chain(limb(-1.0)).chain(limb(1.0)).collect();
-        let mut middles = RawTree::default();
-        for (i, at) in points.iter().enumerate() {
-            let parent = if i == 60 { Some(19) } else { i.checked_sub(1) };
-            let at = at.cast();
-            middles.nodes.push(RawNode { parent, at });
-            middles.of_point.push(i as u32);
-        }
+        let middles = middles_at(
+            &points,
+            |i| {
+                if i == 60 { Some(19) } else { i.checked_sub(1) }
+            },
+        );
         let tree = colonise(&middles, &points, Point3::origin(), 1.0);
         assert!(tree.of_point.iter().all(|node| *node != u32::MAX));
     }
@@ -367,15 +378,7 @@ mod tests {
         let row: Vec<Point3<f32>> = (0..100)
             .map(|i| Point3::new(0.0, 0.0, if i < 40 { i as f32 } else { 60.0 + i as f32 }))
             .collect();
-        let mut middles = RawTree::default();
-        for (i, at) in row.iter().enumerate() {
-            let parent = i.checked_sub(1);
-            middles.nodes.push(RawNode {
-                parent,
-                at: at.cast(),
-            });
-            middles.of_point.push(i as u32);
-        }
+        let middles = middles_at(&row, |i| i.checked_sub(1));
         let tree = colonise(&middles, &row, Point3::origin(), 1.0);
         let tip = tree.nodes.iter().map(|n| n.at.z).fold(0.0, f64::max);
         assert!((155.0..162.0).contains(&tip), "{tip}");

@@ -34,10 +34,10 @@ pub(super) fn find(
     height: f32,
     cell: f32,
 ) -> Result<Vec<u32>, CloudError> {
-    let stands = stands(points, height, cell);
+    let bottom = from_above::bottom(points);
+    let stands = stands(points, bottom + SLAB_SHARE * height, cell);
     let seeds: Vec<u32> = stands.iter().flat_map(|s| &s.lowest).copied().collect();
     let ways = graph.shortest_ways(&seeds);
-    let bottom = points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
     let carried = carried(&stands, &ways, points, bottom + HIGH_SHARE * height);
     let Some(main) = (0..stands.len()).max_by_key(|s| (carried[*s], std::cmp::Reverse(*s))) else {
         return Err(CloudError::NoTree);
@@ -54,11 +54,9 @@ pub(super) fn find(
     Ok(lowest.copied().collect())
 }
 
-/// What hangs together in the lowest part of the tree, seen from above: few points make a torn trunk.
-fn stands(points: &[Point3<f32>], height: f32, cell: f32) -> Vec<Stand> {
-    let bottom = points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min);
-    let slab = bottom + SLAB_SHARE * height;
-    let members = from_above::pieces(points, cell, |at| at.z <= slab);
+/// What hangs together up to a height, seen from above: few points make a torn trunk.
+fn stands(points: &[Point3<f32>], up_to: f32, cell: f32) -> Vec<Stand> {
+    let members = from_above::pieces(points, cell, |at| at.z <= up_to);
     members
         .iter()
         .map(|own| Stand::of(own, points, cell))

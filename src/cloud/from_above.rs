@@ -2,12 +2,14 @@
 //!
 //! Few points on a trunk leave gaps in each of its rings, but not at the same side in all of them.
 
-use super::graph::Graph;
+use super::graph::{Graph, REACH};
 use super::thin::Thinned;
 use nalgebra::Point3;
 
-/// Neighbours are up to so many cells apart.
-const REACH_CELLS: f32 = 1.8;
+/// The height of the lowest point; none is above all.
+pub(super) fn bottom(points: &[Point3<f32>]) -> f32 {
+    points.iter().map(|p| p.z).fold(f32::INFINITY, f32::min)
+}
 
 /// The points of each piece of those that `is_wanted` wants, all at one height; `cell` is their distance.
 pub(super) fn pieces(
@@ -17,12 +19,10 @@ pub(super) fn pieces(
 ) -> Vec<Vec<u32>> {
     let mut wanted: Vec<u32> = (0..points.len() as u32).collect();
     wanted.retain(|p| is_wanted(&points[*p as usize]));
-    let flat: Vec<Point3<f32>> = wanted
-        .iter()
-        .map(|p| Point3::new(points[*p as usize].x, points[*p as usize].y, 0.0))
-        .collect();
+    let places = wanted.iter().map(|p| points[*p as usize]);
+    let flat: Vec<Point3<f32>> = places.map(|at| Point3::new(at.x, at.y, 0.0)).collect();
     let thinned = Thinned::of(&flat, cell);
-    let piece_of = Graph::new(&thinned.points, REACH_CELLS * cell).pieces();
+    let piece_of = Graph::new(&thinned.points, REACH * cell).pieces();
     let count = piece_of.iter().max().map_or(0, |piece| *piece as usize + 1);
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
     for (point, own) in wanted.iter().zip(&thinned.of_point) {

@@ -8,6 +8,9 @@ use std::collections::BinaryHeap;
 /// Way over which a gap is led, against its length: wood that was seen is preferred.
 const GAP_COST: f32 = 2.0;
 
+/// Points are neighbours up to so many times the distance of points about there.
+pub(super) const REACH: f32 = 1.8;
+
 /// Points joined to those near them.
 #[derive(Clone, Debug)]
 pub(super) struct Graph {

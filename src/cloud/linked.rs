@@ -1,6 +1,6 @@
 //! The points that stand on the ground thinned, without noise and leaves, and joined to their neighbours.
 
-use super::graph::Graph;
+use super::graph::{Graph, REACH};
 use super::grid::Grid;
 use super::standing::Standing;
 use super::thin::{self, Thinned};
@@ -18,9 +18,7 @@ const FINEST_TREES: usize = 20;
 /// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
 /// each of their points would take long.
 const GAP_OF_STAND_CELLS: f32 = 8.0;
-/// Points are neighbours up to so many times their distance about there; gaps are led over up to this share of the
-/// tree's height.
-const REACH_CELLS: f32 = 1.8;
+/// Gaps are led over up to this share of the tree's height.
 /// The distance of points about a place is the median of those that are so many cells away, and no more than so many
 /// cells: a trunk may be sparser than twigs, and a gap is none of its points.
 const ABOUT_CELLS: f32 = 5.0;
@@ -67,7 +65,7 @@ impl Linked {
     /// Gaps are led over up to `widest`.
     fn of(thinned: Thinned, cell: f32, widest: f32) -> Self {
         let mut reaches = spacings_about(&thinned.points, cell);
-        reaches.iter_mut().for_each(|s| *s *= REACH_CELLS);
+        reaches.iter_mut().for_each(|s| *s *= REACH);
         let graph = Graph::of_reaches(&thinned.points, &reaches);
         Self {
             thinned,
@@ -79,7 +77,7 @@ impl Linked {
 
     /// The same with wider gaps led over.
     fn bridged(self, widest: f32) -> Self {
-        let reach = REACH_CELLS * self.cell;
+        let reach = REACH * self.cell;
         Self {
             graph: self.graph.bridged(&self.thinned.points, reach, widest),
             ..self
@@ -151,15 +149,7 @@ fn spacings_about(points: &[Point3<f32>], cell: f32) -> Vec<f32> {
     let mut own: Vec<f32> = Vec::with_capacity(points.len());
     let mut near: Vec<f32> = Vec::new();
     for at in points {
-        near.clear();
-        grid.within(at, most, |_, square| near.push(square));
-        own.push(match near.len() > NEIGHBOUR {
-            true => near
-                .select_nth_unstable_by(NEIGHBOUR, f32::total_cmp)
-                .1
-                .sqrt(),
-            false => most,
-        });
+        own.push(to_neighbour(&grid, at, most, &mut near).unwrap_or(most));
     }
     let mut about: Vec<f32> = Vec::with_capacity(points.len());
     for at in points {
@@ -174,22 +164,33 @@ fn spacings_about(points: &[Point3<f32>], cell: f32) -> Vec<f32> {
     about
 }
 
+/// How far a point's neighbour is that says its distance; `None` where it is no nearer than `reach`. `near` is only
+/// room for what is found.
+fn to_neighbour(grid: &Grid, at: &Point3<f32>, reach: f32, near: &mut Vec<f32>) -> Option<f32> {
+    near.clear();
+    grid.within(at, reach, |_, square| near.push(square));
+    if near.len() <= NEIGHBOUR {
+        return None;
+    }
+    let square = *near.select_nth_unstable_by(NEIGHBOUR, f32::total_cmp).1;
+    Some(square.sqrt())
+}
+
 /// The median distance of points to the third of their neighbours: of a sparse cloud it is more
 /// than the side of the cells.
 fn spacing(points: &[Point3<f32>], cell: f32) -> f32 {
     let grid = Grid::new(points, 4.0 * cell);
     let step = (points.len() / 1000).max(1);
     let mut thirds: Vec<f64> = Vec::new();
+    let mut near: Vec<f32> = Vec::new();
     for at in points.iter().step_by(step) {
-        let mut near: Vec<f32> = Vec::new();
         let mut reach = 4.0 * cell;
-        while near.len() <= NEIGHBOUR && reach < 1000.0 * cell {
-            near.clear();
-            grid.within(at, reach, |_, square| near.push(square));
+        let mut third = to_neighbour(&grid, at, reach, &mut near);
+        while third.is_none() && 2.0 * reach < 1000.0 * cell {
             reach *= 2.0;
+            third = to_neighbour(&grid, at, reach, &mut near);
         }
-        near.sort_unstable_by(f32::total_cmp);
-        thirds.extend(near.get(NEIGHBOUR).map(|square| f64::from(square.sqrt())));
+        thirds.extend(third.map(f64::from));
     }
     median(thirds, f64::total_cmp).map_or(cell, |third| third as f32)
 }
@@ -240,8 +241,8 @@ mod tests {
             f64::total_cmp,
         );
         assert!(trunk > Some(1.4 * f64::from(cell)), "{trunk:?} {cell}");
-        let reaches: Vec<f32> = spacings.iter().map(|s| REACH_CELLS * s).collect();
+        let reaches: Vec<f32> = spacings.iter().map(|s| REACH * s).collect();
         assert!(largest(&Graph::of_reaches(&points, &reaches)) > Some(5900));
-        assert!(largest(&Graph::new(&points, REACH_CELLS * cell)) < Some(3000));
+        assert!(largest(&Graph::new(&points, REACH * cell)) < Some(3000));
     }
 }

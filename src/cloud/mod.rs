@@ -254,8 +254,10 @@ fn tree_of(
     Ok(CloudTree { nodes, figures })
 }
 
+/// Refuses a height, m, that no tree has.
+///
 /// # Errors
-/// No tree is so high: the unit is another one.
+/// It is not from 0.05 to 200 m: the unit is another one.
 pub fn check_height(height_m: f64) -> Result<(), CloudError> {
     if HEIGHTS_M.contains(&height_m) {
         return Ok(());

@@ -90,20 +90,24 @@ impl Registration {
     pub fn holds(&self) -> bool {
         match self.other_side_miss {
             Some(other) => self.miss <= LARGEST_MISS && other >= LEAST_CONTRAST * self.miss,
-            None => self.miss <= LARGEST_PAIR_MISS && self.is_upright(),
+            None => self.miss <= LARGEST_PAIR_MISS && is_upright(&self.to_picture),
         }
-    }
-
-    /// Whether the camera is rolled by no more than a film is looked for with.
-    fn is_upright(&self) -> bool {
-        self.to_picture.isometry.rotation.angle().abs() <= LARGEST_ROLL
     }
 
     /// Whether a tree so high, m, is about as high in the picture as that of a film, px.
     pub fn fits_height(&self, height_m: f64, height_px: f64) -> bool {
-        let factor = self.to_picture.scaling() * height_m / height_px;
-        (1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
+        is_about_as_high(self.to_picture.scaling() * height_m / height_px)
     }
+}
+
+/// Whether the camera is rolled by no more than a film is looked for with.
+fn is_upright(to_picture: &Similarity2<f64>) -> bool {
+    to_picture.isometry.rotation.angle().abs() <= LARGEST_ROLL
+}
+
+/// Whether the height of the scan in the picture is so many times that of the film as may be.
+fn is_about_as_high(factor: f64) -> bool {
+    (1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
 }
 
 /// Seen from a side.
@@ -268,9 +272,7 @@ impl Lines {
             let change = CommonMotion::of(&pairs)?.motion;
             to_picture = change * to_picture;
             let factor = to_picture.scaling() / self.start;
-            if to_picture.isometry.rotation.angle().abs() > LARGEST_ROLL
-                || !(1.0 / LARGEST_FACTOR..=LARGEST_FACTOR).contains(&factor)
-            {
+            if !is_upright(&to_picture) || !is_about_as_high(factor) {
                 return None;
             }
         }

@@ -84,7 +84,7 @@ pub(super) fn find(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32)
 fn stems(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<Stem> {
     let breast = BREAST_HEIGHT_M.min(BREAST_SHARE * height);
     let half = (SLICE_SHARE * breast).max(SLICE_CELLS * cell);
-    let bottom = bottom(above);
+    let bottom = from_above::bottom(above);
     let [low, high, ground] =
         [breast - half, breast + half, FOOT_SHARE * breast].map(|z| bottom + z);
     let on_ground: Vec<u32> = (0..above.len() as u32)
@@ -113,11 +113,6 @@ fn stems(above: &[Point3<f32>], graph: &Graph, height: f32, cell: f32) -> Vec<St
         stems.push(Stem { foot, middle });
     }
     stems
-}
-
-/// The height of the lowest point: 0 on ground that was scanned.
-fn bottom(above: &[Point3<f32>]) -> f32 {
-    above.iter().map(|p| p.z).fold(f32::INFINITY, f32::min)
 }
 
 /// Whether points reach through a slice so high, and lean by little.
@@ -160,7 +155,7 @@ fn ranked(above: &[Point3<f32>], of_point: &[u32], height: f32) -> Vec<u32> {
         }
     }
     let most = points.iter().max().map_or(0.0, |n| *n as f64);
-    let least_top = bottom(above) + HIGH_SHARE * height;
+    let least_top = from_above::bottom(above) + HIGH_SHARE * height;
     let mut order: Vec<usize> = (0..count)
         .filter(|s| top[*s] >= least_top && points[*s] as f64 >= LEAST_POINTS_SHARE * most)
         .collect();

@@ -47,6 +47,8 @@ const ARCHI: Table = Table {
     is_z_up: true,
 };
 
+const TABLES: [Table; 3] = [OURS, SIMPLE_FOREST, ARCHI];
+
 /// Where the columns are, and whether z is up.
 struct Columns {
     places: [usize; OURS.columns.len()],
@@ -99,7 +101,7 @@ impl Columns {
     /// Where those of one of the tools are.
     fn of(header: &StringRecord, separator: char) -> Result<Self, ImportError> {
         let place = |name: &str| header.iter().position(|h| h.trim() == name);
-        for table in [OURS, SIMPLE_FOREST, ARCHI] {
+        for table in TABLES {
             let found = table.columns.map(place);
             if found.iter().all(Option::is_some) {
                 return Ok(Self {
@@ -113,7 +115,7 @@ impl Columns {
             }
         }
         // Of the tool whose table it is most like.
-        let missing = [OURS, SIMPLE_FOREST, ARCHI].map(|table| {
+        let missing = TABLES.map(|table| {
             let mut names = table.columns.to_vec();
             names.retain(|name| place(name).is_none());
             names

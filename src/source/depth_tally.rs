@@ -57,8 +57,8 @@ impl DepthTally {
         };
         if tally.with_depth == 0 && tally.empty > 0 {
             lines.push(format!(
-                "{name}: the depth images have nothing but holes, and depth was not used; is the tree within the range of \
-                 the camera?"
+                "{name}: the depth images have nothing but holes, and depth was not used; is the tree within the range \
+                 of the camera?"
             ));
             return lines;
         }

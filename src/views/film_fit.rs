@@ -8,7 +8,7 @@
 //! In steady wind a tree leans as a whole. In the picture that is a roll of the camera about the foot:
 //! lines alone cannot part the two. What is known of the upright does.
 
-use super::film_lines::{FilmPiece, Lines, moved};
+use super::film_lines::{FilmPiece, Lines, UNKNOWNS, moved};
 use crate::cloud::{PlacePair, Registration, WoodPiece};
 use nalgebra::{Point3, Similarity2, Vector2};
 
@@ -38,12 +38,21 @@ pub struct FilmFit {
     /// By how much places of the scan are off in the picture at most in 95 of 100 cases, root mean
     /// square over the tree, as a share of its height.
     pub off_hi: f64,
-    /// Whether nothing but pairs of places says it: lines do not agree.
-    pub by_pairs_alone: bool,
-    /// By how much places are off where lines show another place than the pairs; `None` where they show none.
-    pub elsewhere_off_hi: Option<f64>,
+    /// What says so.
+    pub grounds: Grounds,
     /// Of a film in wind.
     pub lean: Option<Lean>,
+}
+
+/// What says how a film lies on a scan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Grounds {
+    /// The lines of both, and no pairs of places against them.
+    Lines,
+    /// Pairs of places alone: lines show nothing.
+    Pairs,
+    /// Lines, where the pairs have another place.
+    LinesAgainstPairs,
 }
 
 /// How far a tree leans to the right in the picture of a film in wind, against the scan.
@@ -81,8 +90,11 @@ impl FilmFit {
         if !lines.fits_height(&registration, tops.fold(0.0, f64::max)) {
             return None;
         }
-        let sd_share = lines.pairs_miss(&registration, pairs)?.max(PAIR_SD_SHARE);
-        let covariance = lines.pairs_covariance(&registration, pairs, sd_share)?;
+        let numbers = 2 * pairs.len();
+        let free = numbers.checked_sub(UNKNOWNS).filter(|free| *free > 0)?;
+        let miss_sd = registration.miss * (pairs.len() as f64 / free as f64).sqrt();
+        let covariance =
+            lines.pairs_covariance(&registration, pairs, miss_sd.max(PAIR_SD_SHARE))?;
         let off_sd = lines.spread(&registration, &covariance);
         let wind_off = if is_wind { WIND_OFF_SHARE } else { 0.0 };
         let off_hi = (SDS * off_sd).hypot(wind_off);
@@ -90,15 +102,16 @@ impl FilmFit {
         off_hi.is_finite().then_some(Self {
             registration,
             off_hi,
-            by_pairs_alone: true,
-            elsewhere_off_hi: None,
+            grounds: Grounds::Pairs,
             lean: None,
         })
     }
 
     /// Whether it may be used: the registration holds, and is sure enough.
     pub fn holds(&self) -> bool {
-        self.registration.holds() && self.off_hi <= LARGEST_OFF && self.elsewhere_off_hi.is_none()
+        self.registration.holds()
+            && self.off_hi <= LARGEST_OFF
+            && self.grounds != Grounds::LinesAgainstPairs
     }
 
     /// Whether places of the tree at rest are less sure than the registration should be.
@@ -149,8 +162,7 @@ impl FilmFit {
         Some(Self {
             registration,
             off_hi,
-            by_pairs_alone: false,
-            elsewhere_off_hi: None,
+            grounds: Grounds::Lines,
             lean,
         })
     }
@@ -299,7 +311,10 @@ mod tests {
         let mut tips: Vec<Point3<f64>> = scan().iter().map(|piece| piece.to).collect();
         tips.push(Point3::origin());
         let all = fit(&tips).expect("a fit");
-        assert!(all.off_hi < 0.02 && all.by_pairs_alone, "{all:?}");
+        assert!(
+            all.off_hi < 0.02 && all.grounds == Grounds::Pairs,
+            "{all:?}"
+        );
         let near = [[0.0, 0.0, 1.0], [0.2, 0.1, 1.0], [0.1, 0.3, 1.4]].map(Point3::from);
         let near = fit(&near).expect("a fit");
         assert!(near.off_hi > 0.05, "{near:?}");

@@ -27,7 +27,7 @@ pub struct FilmPiece {
 }
 
 /// Turn, roll, logarithm of the scale, and shift, px.
-const UNKNOWNS: usize = 5;
+pub(super) const UNKNOWNS: usize = 5;
 pub(super) type Step = SVector<f64, UNKNOWNS>;
 pub(super) type Square = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
@@ -190,18 +190,6 @@ impl Lines {
     /// Whether a scan so high, m, is about as high in the picture as the film.
     pub fn fits_height(&self, registration: &Registration, height_m: f64) -> bool {
         registration.fits_height(height_m, self.height_px)
-    }
-
-    /// What pairs miss each other by along either axis of the picture, as a share of the height: the standard
-    /// deviation of a place. `None` of fewer than three.
-    pub fn pairs_miss(&self, registration: &Registration, pairs: &[PlacePair]) -> Option<f64> {
-        let free = (2 * pairs.len())
-            .checked_sub(UNKNOWNS)
-            .filter(|free| *free > 0)?;
-        let misses = pairs
-            .iter()
-            .map(|p| (registration.project(&p.scan) - p.film_px).norm_squared());
-        Some((misses.sum::<f64>() / free as f64).sqrt() / self.height_px)
     }
 
     /// The covariance of the step that pairs of places ask for, whose standard deviation along either axis is this

@@ -26,7 +26,7 @@ mod write;
 
 pub use drawn::{DrawnTree, modelled_defaults};
 pub use error::PrepareError;
-pub use film_fit::FilmFit;
+pub use film_fit::{FilmFit, Grounds};
 pub use forest::PreparedForest;
 pub use forest_plan::{ForestOptions, ForestPlan, HeightMap};
 pub use forest_studio::ForestStudio;

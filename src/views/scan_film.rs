@@ -1,6 +1,6 @@
 //! The film of a tree laid on its scan.
 
-use super::film_fit::{FilmFit, Upright};
+use super::film_fit::{FilmFit, Grounds, Upright};
 use super::film_lines::FilmPiece;
 use crate::cloud::{CloudTree, PlacePair, WoodPiece, by_lines, by_pairs};
 use crate::document::Document;
@@ -17,38 +17,34 @@ pub fn register_film(
 ) -> Option<FilmFit> {
     let pieces = film_wood(&film.skeleton);
     let wood: Vec<WoodPiece<Point2<f64>>> = pieces.iter().map(|p| p.wood).collect();
+    let (scan, upright) = (scan_wood(tree), upright_in_wind(film));
     let Some(pairs) = pairs else {
-        let scan = scan_wood(tree);
         let found = by_lines(&wood, &scan)?;
-        return FilmFit::by_lines(found, &pieces, &scan, upright_in_wind(film));
+        return FilmFit::by_lines(found, &pieces, &scan, upright);
     };
     let height_px = wood.iter().map(|p| p.to.y).fold(0.0, f64::max);
     let foot_px = film.skeleton.foot_px;
-    let upright = |p: &PlacePair| PlacePair {
+    let with_v_up = |p: &PlacePair| PlacePair {
         film_px: Point2::new(p.film_px.x - foot_px.x, foot_px.y - p.film_px.y),
         scan: p.scan,
     };
-    let pairs: Vec<PlacePair> = pairs.iter().map(upright).collect();
+    let pairs: Vec<PlacePair> = pairs.iter().map(with_v_up).collect();
     let found = by_pairs(&pairs, height_px)?;
     // Three pairs are six numbers for five unknowns; lines say more, and how sure it is. Where the pairs
     // are from a tree in wind they may lead to another side of it.
-    let scan = scan_wood(tree);
-    let finer = |start| {
-        FilmFit::by_lines(start, &pieces, &scan, upright_in_wind(film)).filter(FilmFit::holds)
-    };
+    let finer = |start| FilmFit::by_lines(start, &pieces, &scan, upright).filter(FilmFit::holds);
     let agrees = |fit: &FilmFit| fit.registration.agrees_with(&pairs, height_px);
     if let Some(fit) = finer(found).filter(agrees) {
         return Some(fit);
     }
     if let Some(fit) = by_lines(&wood, &scan).and_then(finer) {
-        let elsewhere_off_hi = (!agrees(&fit)).then_some(fit.off_hi);
-        return Some(FilmFit {
-            elsewhere_off_hi,
-            ..fit
-        });
+        let grounds = match agrees(&fit) {
+            true => Grounds::Lines,
+            false => Grounds::LinesAgainstPairs,
+        };
+        return Some(FilmFit { grounds, ..fit });
     }
-    let is_wind = upright_in_wind(film).is_some();
-    FilmFit::by_pairs(found, &pairs, &pieces, &scan, is_wind)
+    FilmFit::by_pairs(found, &pairs, &pieces, &scan, upright.is_some())
 }
 
 /// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree

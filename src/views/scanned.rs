@@ -2,7 +2,7 @@
 
 use super::PrepareError;
 use super::drawn::{DrawnTree, note};
-use super::film_fit::FilmFit;
+use super::film_fit::{FilmFit, Grounds};
 use crate::cloud::{CloudTree, verdict};
 use crate::config::{Config, LeafShow};
 use crate::document::note::{ScanFilmNote, ScanNote};
@@ -52,22 +52,26 @@ impl FilmOnScan {
         let is_other = times > 0.0 && !(1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&times);
         is_other.then(|| {
             format!(
-                "by its own scale the film has the tree {times:.2} times as large as the scan; check the unit of the scan \
-                 (--unit) and the scale of the film, or it is another tree"
+                "by its own scale the film has the tree {times:.2} times as large as the scan; check the unit of the \
+                 scan (--unit) and the scale of the film, or it is another tree"
             )
         })
+    }
+
+    fn is_by_pairs(&self) -> bool {
+        self.fit.grounds == Grounds::Pairs
     }
 
     /// That of a registration which lines did not make surer.
     fn unsure_warning(&self) -> Option<String> {
         let unsure = "the film lies on the scan by its pairs alone: the lines of film and scan do not confirm it; more \
                       pairs, all over the tree, make it surer";
-        self.fit.by_pairs_alone.then(|| unsure.to_owned())
+        self.is_by_pairs().then(|| unsure.to_owned())
     }
 
     /// What is not as it should be of a registration that nothing but its pairs tells.
     pub fn finding(&self) -> Option<Finding> {
-        self.fit.by_pairs_alone.then(|| Finding {
+        self.is_by_pairs().then(|| Finding {
             grade: Grade::Fair,
             reason: "the film lies on the scan by its pairs alone".to_owned(),
             advice: "give more pairs, all over the tree".to_owned(),
@@ -214,8 +218,7 @@ mod tests {
                     other_side_miss: Some(0.02),
                 },
                 off_hi: 0.01,
-                by_pairs_alone: false,
-                elsewhere_off_hi: None,
+                grounds: Grounds::Lines,
                 lean: None,
             },
             sway: Vec::new(),

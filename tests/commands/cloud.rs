@@ -814,7 +814,7 @@ fn a_film_on_the_wood_of_its_own_tree_gives_it_its_frequencies() {
         rows[1].clone(),
     ];
     refused(&off, FAILED, "lies off the picture of the film");
-    // Of the same table in feet, by a film that knows its metres.
+    // A film without a scale says nothing of sizes.
     let scaled = dir.path().join("film");
     let said = done(&["cloud", name, "--film", film, "--unit", "ft"], &scaled);
     assert!(!said.contains("times as large"), "{said}");

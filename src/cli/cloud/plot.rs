@@ -78,8 +78,8 @@ fn print_found(scan: &Scan, found: &CloudTrees) {
     let left_out = figures.percent(figures.points - of_trees - figures.ground);
     if left_out > MOST_LEFT_OUT_PERCENT {
         eprint_line(&format!(
-            "arborcam: warning: {left_out:.0} % of the points are of no tree that was found and not of the ground; where that is \
-             not undergrowth, cut the missing trees out of the scan"
+            "arborcam: warning: {left_out:.0} % of the points are of no tree that was found and not of the ground; \
+             where that is not undergrowth, cut the missing trees out of the scan"
         ));
     }
 }

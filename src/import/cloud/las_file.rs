@@ -82,16 +82,15 @@ struct Lengths {
 impl Lengths {
     /// Points for which a file has room at least, be it that `said` are in it.
     fn room(self, header: &las::Header, said: u64) -> u64 {
-        let in_chunks = header
-            .laz_vlr()
-            .ok()
-            .filter(|laz| !laz.uses_variable_size_chunks())
-            .map(|laz| {
-                u64::from(laz.chunk_size()).saturating_mul(self.chunks.saturating_sub(1)) + 1
-            });
-        match header.point_format().is_compressed {
-            true => in_chunks.filter(|_| self.chunks > 0).unwrap_or(said),
-            false => self.records,
+        if !header.point_format().is_compressed {
+            return self.records;
+        }
+        match (header.laz_vlr(), self.chunks.checked_sub(1)) {
+            // The last chunk holds one at least.
+            (Ok(laz), Some(full)) if !laz.uses_variable_size_chunks() => {
+                u64::from(laz.chunk_size()).saturating_mul(full) + 1
+            }
+            _ => said,
         }
     }
 }
