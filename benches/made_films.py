@@ -60,7 +60,7 @@ def main():
     parser.add_argument("--bad", action="append", default=[], choices=bad_input.KINDS)
     parser.add_argument("--markers", type=int, default=0, metavar="NUMBER", help="so many coloured markers at most")
     parser.add_argument("--depth", action="store_true", help="a depth camera films it, in real metres")
-    parser.add_argument("--tag", action="store_true", help="a tag of 0.16 m hangs beside the tree")
+    parser.add_argument("--tag", action="store_true", help="a tag of 36 px hangs beside the tree (with --depth of 0.137 m)")
     parser.add_argument("--force", type=float, default=1.0, help="times as strong a pull")
     parser.add_argument("--roll", type=float, default=0.0, metavar="DEG", help="the camera is rolled: the tree leans to the right in the picture")
     parser.add_argument("--rope-at", type=int, metavar="BRANCH", help="the rope is on this branch (its id in truth.json): it and what "

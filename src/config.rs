@@ -20,7 +20,7 @@ pub use reference::{default_file, help, range, tables};
 pub use reload::{Change, effect};
 pub use setting::{Choice, Effect, Range, Section, Setting};
 pub use settings::{
-    Accumulate, Affinity, Backend, Camera, CameraFormat, Config, Depth, Detect, Dynamics,
+    Accumulate, Affinity, Backend, Camera, CameraFormat, Cloud, Config, Depth, Detect, Dynamics,
     EnvelopeKind, Excited, Export, Hierarchy, Leader, LeafShow, Leaves, MarkerMethod, Markers,
     Motion, MotionMethod, Outline, SECTIONS, Shape, Skeleton, Tag, TraceBy, Track, Wind, Wood,
 };

@@ -2,9 +2,11 @@
 //! a branch a sensor mixes it with what is behind, and gives a depth where nothing is.
 
 mod gate;
+mod lag;
 mod register;
 
 pub use gate::DepthGate;
+pub use lag::{DepthLag, LagMeter};
 pub use register::Registration;
 
 use crate::config;
@@ -74,6 +76,7 @@ pub fn format(settings: &config::Depth) -> Option<DepthFormat> {
         pinhole,
         distortion: CameraModel::coefficients(&settings.distortion),
         unit_m: settings.unit_m,
+        late_s: settings.late_s,
     })
 }
 

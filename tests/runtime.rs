@@ -9,7 +9,7 @@ use arborcam::cancel::CancelToken;
 use arborcam::config::{Config, Dynamics};
 use arborcam::model::{
     Control, FormatNote, LocalTime, NodeName, Outline, PixelFormat, RawFrame, Size, SwayNow,
-    Swaying,
+    Swaying, TrackId,
 };
 use arborcam::outline::{Given, Mark, Scribbles};
 use arborcam::pipeline::Pipeline;
@@ -73,6 +73,14 @@ fn fake(
 
 /// The recording, waiting before frame `at` until it is let go on.
 fn gated(at: u64) -> (Box<Fake>, Gate) {
+    gated_film(at, frame)
+}
+
+/// The same with a film of these frames.
+fn gated_film(
+    at: u64,
+    frame: impl Fn(u64) -> Option<RawFrame> + Send + 'static,
+) -> (Box<Fake>, Gate) {
     let (reached_in, reached) = mpsc::channel();
     let (open, opened) = mpsc::channel::<()>();
     let taken = Arc::new(AtomicU64::new(0));
@@ -151,7 +159,15 @@ fn run(source: Box<Fake>, job: Job) -> (Option<Summary>, Option<Failure>, Vec<St
 
 /// Sends `wishes` before frame `at` is taken, and waits for the end.
 fn wish(at: u64, wishes: &[Control], out: &Path) -> (Summary, Vec<String>) {
-    let (source, gate) = gated(at);
+    wish_in(gated(at), wishes, out)
+}
+
+/// The same while another film waits at its gate.
+fn wish_in(
+    (source, gate): (Box<Fake>, Gate),
+    wishes: &[Control],
+    out: &Path,
+) -> (Summary, Vec<String>) {
     let running = runtime::start(source, job(Some(support::outline()), Some(out))).expect("start");
     gate.reached
         .recv_timeout(HANGS)
@@ -544,6 +560,70 @@ fn strokes_are_used_shown_kept_and_finished_with() {
 
 /// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the
 /// tree is followed, in the region and off the sky between its branches.
+/// Where two red discs are in a film of 3 s, px.
+fn discs_px(n: u64) -> [Point2<f64>; 2] {
+    let swing = 6.0 * (0.2 * n as f64).sin();
+    [
+        Point2::new(320.0 + 0.5 * swing, 260.0),
+        Point2::new(360.0 + swing, 120.0),
+    ]
+}
+
+/// Frame `n` of that film: the discs before a wall.
+fn with_discs(n: u64) -> Option<RawFrame> {
+    let mut bytes = Vec::with_capacity(3 * SIZE.area());
+    for v in 0..SIZE.height {
+        for u in 0..SIZE.width {
+            let here = Point2::new(f64::from(u), f64::from(v));
+            let is_disc = discs_px(n)
+                .iter()
+                .any(|at| nalgebra::distance(at, &here) < 7.0);
+            let wall = (100 + (u / 16 * 7 + v / 16 * 5) % 9 * 5) as u8;
+            bytes.extend(if is_disc { [200, 30, 40] } else { [wall; 3] });
+        }
+    }
+    (n < 90).then(|| RawFrame {
+        sequence: Some(n),
+        sensor_time_s: 5.0 + n as f64 / 30.0,
+        size: SIZE,
+        format: PixelFormat::Rgb24,
+        bytes,
+        depth: None,
+    })
+}
+
+#[test]
+fn markers_that_are_picked_and_hung_on_each_other_are_in_the_capture() {
+    let dir = tempfile::tempdir().expect("tempdir");
+    let out = dir.path().join("out");
+    let near: Vec<Point2<f64>> = discs_px(30).to_vec();
+    let wishes = [
+        Control::PickMarkers(near.clone()),
+        Control::HangMarkers(near),
+        // What is wrong is said, and changes nothing.
+        Control::HangMarkers(vec![Point2::new(20.0, 20.0), Point2::new(320.0, 260.0)]),
+    ];
+    let (_, warnings) = wish_in(gated_film(30, with_discs), &wishes, &out);
+    let note = std::fs::read_to_string(out.join("capture.json")).expect("a capture");
+    let note: serde_json::Value = serde_json::from_str(&note).expect("JSON");
+    let windows = &note["config"]["markers"]["windows"];
+    assert_eq!(windows[0]["name"], "m1", "{windows}");
+    assert_eq!(
+        (&windows[1]["name"], &windows[1]["parent"]),
+        (&"m2".into(), &"m1".into())
+    );
+    assert!(windows[2].is_null(), "{windows}");
+    assert!(
+        warnings
+            .iter()
+            .any(|w| w.contains("no marker is near 20, 20 px")),
+        "{warnings:?}"
+    );
+    let first = u64::from(TrackId::of_marker(0).0);
+    let followed = tracks(&out).iter().filter(|(id, _)| *id >= first).count();
+    assert!(followed >= 110, "{followed}");
+}
+
 #[test]
 fn scribbles_are_solved_on_the_first_picture() {
     let strokes = image::open("tests/matting/scribbles.png")

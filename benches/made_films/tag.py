@@ -5,7 +5,7 @@ import numpy as np
 from .picture import FINE, HEIGHT, WIDTH
 
 ID, CELLS = 7, 10  # its number; cells along a side with the white rim
-CELL_PX = 4.5
+CELL_PX = 4.5  # its black square is 36 px: of a film with depth 0.137 m, else 0.16 m by --tag 0.16
 OFF_EDGE_PX = 14.0
 
 

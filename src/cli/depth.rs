@@ -15,6 +15,8 @@ use std::path::Path;
 /// Smallest and largest plausible count of a depth image, m.
 const LEAST_UNIT_M: f64 = 1e-6;
 const LARGEST_UNIT_M: f64 = 1.0;
+/// Depth images are late or early by this at most, s.
+const LONGEST_LATE_S: f64 = 0.25;
 
 /// Depth options of every command that films or reads a film.
 #[derive(Clone, Debug, Default, Args)]
@@ -28,8 +30,11 @@ pub struct DepthArgs {
     /// docs/depth.md.
     #[arg(long, value_name = "FILE", value_parser = camera)]
     depth_camera: Option<CameraFile>,
+    /// How much later depth images are stamped than they were taken, s, where a warning says so: e.g. 0.05.
+    #[arg(long, value_name = "SECONDS", value_parser = late, allow_negative_numbers = true)]
+    depth_late: Option<f64>,
     /// Take the colours of a film with depth alone.
-    #[arg(long, conflicts_with_all = ["depth_unit", "depth_camera"])]
+    #[arg(long, conflicts_with_all = ["depth_unit", "depth_camera", "depth_late"])]
     no_depth: bool,
 }
 
@@ -39,6 +44,15 @@ fn unit(text: &str) -> Result<f64, String> {
         text.trim().trim_end_matches('m'),
         LEAST_UNIT_M..=LARGEST_UNIT_M,
         "give the metres of one count, 0.000001 to 1, like 0.001",
+    )
+}
+
+/// Parses how late depth images are stamped, s.
+fn late(text: &str) -> Result<f64, String> {
+    parse_within(
+        text.trim().trim_end_matches('s'),
+        -LONGEST_LATE_S..=LONGEST_LATE_S,
+        "give seconds, -0.25 to 0.25, like 0.05",
     )
 }
 
@@ -79,6 +93,7 @@ impl DepthArgs {
             depth.unit_m = file.unit_m.unwrap_or(depth.unit_m);
         }
         depth.unit_m = self.depth_unit.unwrap_or(depth.unit_m);
+        depth.late_s = self.depth_late.unwrap_or(depth.late_s);
     }
 
     /// Notes the options that change nothing, as the film of this source has no depth.
@@ -89,6 +104,7 @@ impl DepthArgs {
         for (is_given, option) in [
             (self.depth_unit.is_some(), "--depth-unit"),
             (self.depth_camera.is_some(), "--depth-camera"),
+            (self.depth_late.is_some(), "--depth-late"),
         ] {
             if is_given {
                 unused::note(option, "the film has no depth");

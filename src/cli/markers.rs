@@ -60,13 +60,7 @@ impl MarkerArgs {
     /// They were drawn in one of another size.
     pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
         match &self.markers {
-            Some(MarkerSpec::Given(file)) if file.size() != size => {
-                Err(CommandError::BadUsage(anyhow!(
-                    "--markers is for a picture of {}, this one is {size}; draw the windows on the \
-                     first frame of this film",
-                    file.size()
-                )))
-            }
+            Some(MarkerSpec::Given(file)) => file.check_size(size),
             _ => Ok(()),
         }
     }
@@ -135,8 +129,23 @@ impl MarkerFile {
         Ok(file)
     }
 
-    fn size(&self) -> Size {
-        Size::new(self.width, self.height)
+    /// Checks that the windows were drawn in a picture of this size.
+    ///
+    /// # Errors
+    /// They were drawn in one of another size.
+    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
+        let own = Size::new(self.width, self.height);
+        if own == size {
+            return Ok(());
+        }
+        Err(CommandError::BadUsage(anyhow!(
+            "--markers is for a picture of {own}, this one is {size}; draw the windows on the first frame of this film"
+        )))
+    }
+
+    /// Whether it gives places of markers in later frames.
+    pub fn has_corrections(&self) -> bool {
+        !self.corrections.is_empty()
     }
 }
 

@@ -135,6 +135,9 @@ settings! {
         /// Metres for each count of a depth image, e.g. 0.001; `--depth-unit` sets it. Give it where the
         /// film or the camera does not say it.
         unit_m: f64 [0 ("as the film says") to 1] = 0.0;
+        /// How much later depth images are stamped than they were taken, by the clock of the pictures, s; below 0
+        /// where they are stamped too early. `--depth-late` sets it.
+        late_s: f64 [-0.25 to 0.25] = 0.0;
         /// Standard deviation of a depth that is the same at any distance, m. Give it for a camera that
         /// times light: 0.005 to 0.02.
         noise_m: f64 [0 to 10] = 0.0;
@@ -255,6 +258,17 @@ settings! {
         leader: Leader = Leader::None;
         /// The trunk as it was drawn, from the foot up, px of the picture; `--trunk FILE` sets it.
         leader_px: Vec<[f64; 2]> = Vec::new();
+    }
+
+    /// Space colonisation of a point cloud (`cloud --method colonisation` or `runions`). See docs/clouds.md.
+    cloud: Cloud, TREE {
+        /// Length of a step D, in distances of points. More for a coarser tree.
+        step_cells: f64 [0.5 to 50] = 2.0;
+        /// How near a node is to a point that it has reached (d_k), steps. More where strands of one branch run side
+        /// by side.
+        kill_steps: f64 [0 ("1, with runions 2") to 50] = 0.0;
+        /// How near it is to a point that draws it (d_i), steps; more than kill_steps. More to grow over wider gaps.
+        influence_steps: f64 [0 ("2, with runions 8") to 100] = 0.0;
     }
 
     /// The wood that is drawn: curl, twigs, thickness, mesh (Li 2011 sect. 3).

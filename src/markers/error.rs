@@ -66,6 +66,19 @@ pub enum MarkerEvent {
         name: String,
         time_s: f64,
     },
+    /// No frame that was looked at was the one of a correction.
+    CorrectionUnused {
+        name: String,
+        frame: u64,
+    },
+    /// What the user says hangs on what, each on the one before.
+    Hung {
+        names: Vec<String>,
+    },
+    /// What he says cannot be: why.
+    NotHung {
+        why: String,
+    },
     /// One that was picked in the picture is not followed.
     NotTaken {
         why: MarkerError,
@@ -75,7 +88,10 @@ pub enum MarkerEvent {
 impl MarkerEvent {
     /// Whether the user should know it before trusting the result.
     pub fn is_warning(&self) -> bool {
-        !matches!(self, Self::Hidden { .. } | Self::FoundAgain { .. })
+        !matches!(
+            self,
+            Self::Hidden { .. } | Self::FoundAgain { .. } | Self::Hung { .. }
+        )
     }
 }
 
@@ -102,6 +118,15 @@ impl fmt::Display for MarkerEvent {
                 "marker {name} is not found again after {time_s:.1} s; give its place in a later frame \
                  (corrections in the file of --markers)"
             ),
+            Self::CorrectionUnused { name, frame } => write!(
+                f,
+                "the correction of marker {name} in frame {frame} changes nothing: the film has no such frame after \
+                 the first that was followed; give one of the frames in tracks.csv"
+            ),
+            Self::Hung { names } => {
+                write!(f, "markers from the foot on: {}", names.join(", "))
+            }
+            Self::NotHung { why } => write!(f, "markers do not hang on each other so: {why}"),
             Self::NotTaken { why } => write!(f, "{why}"),
         }
     }

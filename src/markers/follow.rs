@@ -9,7 +9,7 @@ use super::marker::{Marker, Sighting};
 use super::places::check_places;
 use super::search::{candidates, settled};
 use super::way::Way;
-use crate::config::{MAX_MARKERS, MarkerWindow, Markers};
+use crate::config::{MAX_MARKERS, MarkerWindow, Markers, check_marker_names};
 use crate::model::{Outline, Rgb, TrackId};
 use nalgebra::{Point2, Vector2};
 
@@ -43,6 +43,8 @@ pub struct MarkerPlace {
 pub struct MarkerTracker {
     settings: Markers,
     markers: Vec<Marker>,
+    /// Which of the corrections were of a frame that came.
+    is_used: Vec<bool>,
     events: Vec<MarkerEvent>,
 }
 
@@ -73,6 +75,7 @@ impl MarkerTracker {
         let mut tracker = Self {
             settings: settings.clone(),
             markers: Vec::new(),
+            is_used: vec![false; settings.corrections.len()],
             events: Vec::new(),
         };
         let areas: Vec<PixelArea> = windows.iter().map(PixelArea::of_window).collect();
@@ -142,6 +145,45 @@ impl MarkerTracker {
         self.add(&hsv, given, &elsewhere, time_s)
     }
 
+    /// Hangs the markers that are nearest to these places, px, on each other, the first nearest to the foot. A place that
+    /// is farther than `reach_px` from all markers means none; what speaks against it is an event.
+    pub fn hang(&mut self, places_px: &[Point2<f64>], reach_px: f64) {
+        let event = match self.hung(places_px, reach_px) {
+            Ok(names) => MarkerEvent::Hung { names },
+            Err(why) => MarkerEvent::NotHung { why },
+        };
+        self.events.push(event);
+    }
+
+    fn hung(&mut self, places_px: &[Point2<f64>], reach_px: f64) -> Result<Vec<String>, String> {
+        let mut order = Vec::new();
+        for at_px in places_px {
+            let nearest = self
+                .nearest(*at_px, reach_px)
+                .ok_or_else(|| format!("no marker is near {:.0}, {:.0} px", at_px.x, at_px.y))?;
+            if order.last() != Some(&nearest) {
+                order.push(nearest);
+            }
+        }
+        let mut windows = self.windows();
+        for pair in order.windows(2) {
+            windows[pair[1]].parent = Some(windows[pair[0]].name.clone());
+        }
+        check_marker_names(&windows).map_err(|e| e.to_string())?;
+        let names = order.iter().map(|k| windows[*k].name.clone()).collect();
+        for (marker, window) in self.markers.iter_mut().zip(windows) {
+            marker.given = window;
+        }
+        Ok(names)
+    }
+
+    /// The marker that is nearest to a place, px, if one is near.
+    fn nearest(&self, at_px: Point2<f64>, reach_px: f64) -> Option<usize> {
+        let off_px = |k: &usize| (self.markers[*k].way.at_px() - at_px).norm();
+        let nearest = (0..self.markers.len()).min_by(|a, b| off_px(a).total_cmp(&off_px(b)));
+        nearest.filter(|k| off_px(k) <= reach_px)
+    }
+
     /// The markers as they were given or found, in the order of their ids.
     pub fn windows(&self) -> Vec<MarkerWindow> {
         self.markers.iter().map(|m| m.given.clone()).collect()
@@ -188,6 +230,13 @@ impl MarkerTracker {
     pub fn finish(&mut self) {
         self.events
             .extend(self.markers.iter().filter_map(Marker::finish));
+        let corrections = self.settings.corrections.iter().zip(&self.is_used);
+        for (correction, _) in corrections.filter(|(_, is_used)| !**is_used) {
+            self.events.push(MarkerEvent::CorrectionUnused {
+                name: correction.marker.clone(),
+                frame: correction.frame,
+            });
+        }
     }
 
     /// Where each marker is seen in the next frame.
@@ -229,12 +278,9 @@ impl MarkerTracker {
 
     /// Sets windows where the user says that the markers are in this frame.
     fn correct(&mut self, frame: u64, time_s: f64) {
-        for correction in self
-            .settings
-            .corrections
-            .iter()
-            .filter(|c| c.frame == frame)
-        {
+        let corrections = self.settings.corrections.iter().zip(&mut self.is_used);
+        for (correction, is_used) in corrections.filter(|(c, _)| c.frame == frame) {
+            *is_used = true;
             let named = |m: &&mut Marker| m.given.name == correction.marker;
             if let Some(marker) = self.markers.iter_mut().find(named) {
                 marker.set(correction.at_px.into(), time_s);

@@ -14,6 +14,8 @@ pub enum Control {
     TakeBackStroke,
     /// Follow the coloured markers at these places, px, from the next frame on.
     PickMarkers(Vec<Point2<f64>>),
+    /// The markers nearest to these places, px, hang on each other in this order, the first nearest to the foot.
+    HangMarkers(Vec<Point2<f64>>),
     /// Build the tree from the motion seen so far.
     BuildNow,
     /// Forget tracks and tree, keep the outline rule, start again.

@@ -8,6 +8,11 @@ use std::collections::BTreeMap;
 /// 2012).
 pub const DEPTH_APART_S: f64 = 0.02;
 
+/// Focal lengths across and down are in this proportion: pixels are squares, or of television.
+const FOCAL_RATIOS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+/// Angles that pictures span across, degrees.
+const VIEWS_DEG: std::ops::RangeInclusive<f64> = 0.5..=170.0;
+
 /// A camera without distortion: where places before it are seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
@@ -23,6 +28,43 @@ impl Pinhole {
     pub fn place_m(&self, at_px: Point2<f64>, depth_m: f64) -> Point3<f64> {
         let ray = (at_px - self.middle_px).component_div(&self.focal_px);
         Point3::new(ray.x * depth_m, ray.y * depth_m, depth_m)
+    }
+
+    /// Whether pictures of this size can be of it: what is written wrongly by a digit is no camera.
+    ///
+    /// # Errors
+    /// Why not, in one line.
+    pub fn check(&self, picture: Size) -> Result<(), String> {
+        if !self.is_valid() {
+            return Err("its focal lengths must be numbers above 0".to_owned());
+        }
+        let [across, down] = [self.focal_px.x, self.focal_px.y];
+        if !FOCAL_RATIOS.contains(&(across / down)) {
+            return Err(format!(
+                "its focal lengths are {across} px across and {down} px down, and they are nearly the same in all \
+                 cameras"
+            ));
+        }
+        let view_deg = 2.0
+            * (0.5 * f64::from(picture.width) / across)
+                .atan()
+                .to_degrees();
+        if !VIEWS_DEG.contains(&view_deg) {
+            return Err(format!(
+                "with a focal length of {across} px its picture spans {view_deg:.1} degrees, and {} to {} are usual",
+                VIEWS_DEG.start(),
+                VIEWS_DEG.end()
+            ));
+        }
+        let [u, v] = [self.middle_px.x, self.middle_px.y];
+        let is_in = (0.0..=f64::from(picture.width)).contains(&u)
+            && (0.0..=f64::from(picture.height)).contains(&v);
+        match is_in {
+            true => Ok(()),
+            false => Err(format!(
+                "its middle is {u}, {v} px, off the picture of {picture}"
+            )),
+        }
     }
 
     /// Whether it is one: focal lengths above 0, all numbers finite.
@@ -95,6 +137,8 @@ pub struct DepthFormat {
     pub distortion: [f64; 8],
     /// Metres for each count.
     pub unit_m: f64,
+    /// How much later its images are stamped than they were taken, by the clock of the pictures, s.
+    pub late_s: f64,
 }
 
 /// The depth of a point along the camera's axis.
@@ -143,6 +187,23 @@ pub fn depth_in_model_px(foot_m: f64, metres_per_px: f64, depth_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_camera_that_is_written_wrongly_is_refused() {
+        let why = |fx: f64, fy: f64, cx: f64| {
+            let pinhole = Pinhole {
+                focal_px: Vector2::new(fx, fy),
+                middle_px: Point2::new(cx, 180.0),
+            };
+            pinhole.check(Size::new(640, 360)).err().unwrap_or_default()
+        };
+        assert_eq!(why(525.0, 527.0, 319.5), "");
+        assert!(why(525.0, 52.5, 319.5).contains("nearly the same in all cameras"));
+        assert!(why(100_001.0, 100_001.0, 319.5).contains("spans 0.4 degrees"));
+        assert!(why(5.0, 5.0, 319.5).contains("spans 178.2 degrees"));
+        assert!(why(525.0, 525.0, -5.0).contains("off the picture of 640x360"));
+        assert!(why(f64::NAN, 525.0, 319.5).contains("above 0"));
+    }
 
     #[test]
     fn a_place_is_found_from_its_pixel_and_depth() {

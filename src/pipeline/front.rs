@@ -4,7 +4,7 @@ use super::back::Followed;
 use super::marked::{MarkerDepths, MarkerStage};
 use super::tagged::{TagNews, TagStage};
 use crate::config::{Config, MarkerWindow};
-use crate::depth::{DepthGate, DepthReader};
+use crate::depth::{DepthGate, DepthLag, DepthReader, LagMeter};
 use crate::markers::{MarkerError, MarkerEvent, MarkerPlace};
 use crate::model::{DepthImage, Frame, Luma, Outline, Size, TrackSet};
 use crate::outline::{AutoOutline, Found};
@@ -34,6 +34,7 @@ pub struct FrontEnd {
     tag: TagStage,
     depth: Option<DepthReader>,
     depth_gate: DepthGate,
+    depth_lag: Option<LagMeter>,
     next_id: u32,
     spare: Option<Luma>,
     progress: f64,
@@ -54,6 +55,7 @@ impl FrontEnd {
             markers: MarkerStage::new(&config.markers),
             tag: TagStage::new(config),
             depth: DepthReader::new(&config.depth),
+            depth_lag: LagMeter::new(&config.depth),
             depth_gate: DepthGate::default(),
             next_id: 0,
             spare: None,
@@ -174,6 +176,21 @@ impl FrontEnd {
         self.markers.pick(places_px);
     }
 
+    /// Hangs the markers nearest to these places, px, on each other, the first nearest to the foot, in the next frame.
+    pub fn hang_markers(&mut self, places_px: Vec<Point2<f64>>) {
+        self.markers.hang(places_px);
+    }
+
+    /// Whether the film has depth.
+    pub fn has_depth(&self) -> bool {
+        self.depth.is_some()
+    }
+
+    /// How late the film's depth images are, where they show that.
+    pub fn depth_lag(&self) -> Option<DepthLag> {
+        self.depth_lag.as_ref()?.lag()
+    }
+
     /// Looks for the outline in one more frame.
     fn search_in(&mut self, frame: &Frame) {
         let camera = self.view.step(frame);
@@ -215,6 +232,9 @@ impl FrontEnd {
         if let (Some(reader), Some(image)) = (&self.depth, &frame.depth) {
             look_up_depths(reader, image, frame.luma.size, &mut tracks);
             self.depth_gate.step(&mut tracks.observations);
+        }
+        if let Some(meter) = &mut self.depth_lag {
+            meter.step(&tracks, frame.luma.size, frame.depth.as_ref());
         }
         self.spare = Some(frame.luma);
         Some(Followed {

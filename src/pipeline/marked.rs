@@ -7,8 +7,10 @@ use crate::model::{Background, DepthImage, Frame, Observation, Outline, Size, Tr
 use nalgebra::Point2;
 use std::collections::BTreeSet;
 
-/// Side of the window around a marker that is picked, px at 640 px.
+/// Side of the window around a marker that is picked, px at 640 px, and how far from a marker a click may be that means
+/// it: the picture in a terminal is coarse.
 const PICKED_SIDE_PX: f64 = 16.0;
+const MEANT_PX: f64 = 48.0;
 
 /// What is known of the depths of markers before a frame, and the depth in it.
 pub(super) struct MarkerDepths<'a> {
@@ -34,6 +36,8 @@ pub(super) struct MarkerStage {
     tracker: Option<MarkerTracker>,
     /// Picked in the picture, px; they are taken in the next frame.
     picked_px: Vec<Point2<f64>>,
+    /// Places of markers that hang on each other in this order, px.
+    orders_px: Vec<Vec<Point2<f64>>>,
     /// Those that are in the tracks.
     joined: BTreeSet<TrackId>,
     error: Option<MarkerError>,
@@ -47,6 +51,7 @@ impl MarkerStage {
             settings: settings.clone(),
             tracker: None,
             picked_px: Vec::new(),
+            orders_px: Vec::new(),
             joined: BTreeSet::new(),
             error: None,
             are_new: false,
@@ -75,9 +80,13 @@ impl MarkerStage {
         let Some(tracker) = &mut self.tracker else {
             return Vec::new();
         };
-        let side_px = PICKED_SIDE_PX * f64::from(picture.size.width) / 640.0;
+        let scale = f64::from(picture.size.width) / 640.0;
         for at_px in self.picked_px.drain(..) {
-            tracker.pick(&picture, frame.time_s, at_px, side_px);
+            tracker.pick(&picture, frame.time_s, at_px, PICKED_SIDE_PX * scale);
+            self.are_new = true;
+        }
+        for places_px in self.orders_px.drain(..) {
+            tracker.hang(&places_px, MEANT_PX * scale);
             self.are_new = true;
         }
         tracker.step(frame.index, frame.time_s, &picture, depths)
@@ -114,6 +123,10 @@ impl MarkerStage {
 
     pub fn pick(&mut self, places_px: Vec<Point2<f64>>) {
         self.picked_px.extend(places_px);
+    }
+
+    pub fn hang(&mut self, places_px: Vec<Point2<f64>>) {
+        self.orders_px.push(places_px);
     }
 
     pub fn finish(&mut self) {

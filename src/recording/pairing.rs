@@ -7,10 +7,10 @@ use std::sync::Arc;
 
 /// Images that are further apart in time do not belong together, ns.
 const APART_NS: u64 = (1e9 * DEPTH_APART_S) as u64;
-/// A picture waits for its depth until something is so much later, ns.
+/// A picture waits for its depth until something is so much later, ns; longer where depth is known to be late.
 const PATIENCE_NS: i64 = 100_000_000;
-/// So many pictures and so many depth images are held at most.
-const HELD: usize = 8;
+/// So many pictures and so many depth images are held at most: a quarter of a second at 60 frames/s.
+const HELD: usize = 16;
 
 /// What waits for its depth image.
 pub trait AwaitsDepth {
@@ -46,6 +46,8 @@ pub struct Pairing<P> {
     pictures: VecDeque<P>,
     depths: VecDeque<Timed>,
     newest_ns: Option<i64>,
+    /// How much later depth images are stamped than they were taken, ns.
+    late_ns: i64,
 }
 
 #[derive(Debug)]
@@ -67,19 +69,29 @@ impl<P> Default for Pairing<P> {
             pictures: VecDeque::new(),
             depths: VecDeque::new(),
             newest_ns: None,
+            late_ns: 0,
         }
     }
 }
 
 impl<P: AwaitsDepth> Pairing<P> {
+    /// For depth images that are stamped so much later than they were taken, s.
+    pub fn late_by(late_s: f64) -> Self {
+        Self {
+            late_ns: nanoseconds(late_s),
+            ..Self::default()
+        }
+    }
+
     /// Takes a picture.
     pub fn picture(&mut self, picture: P) {
         self.seen(picture.time_ns());
         self.pictures.push_back(picture);
     }
 
-    /// Takes a depth image.
-    pub fn depth(&mut self, time_ns: i64, image: Arc<DepthImage>) {
+    /// Takes a depth image with its stamp.
+    pub fn depth(&mut self, stamp_ns: i64, image: Arc<DepthImage>) {
+        let time_ns = stamp_ns.saturating_sub(self.late_ns);
         self.seen(time_ns);
         if self.depths.len() == HELD {
             self.depths.pop_front();
@@ -98,7 +110,8 @@ impl<P: AwaitsDepth> Pairing<P> {
         let waited = self
             .newest_ns
             .map_or(0, |newest| newest.saturating_sub(time_ns));
-        if is_passed || waited > PATIENCE_NS || self.pictures.len() > HELD {
+        let patience_ns = PATIENCE_NS + self.late_ns.max(0);
+        if is_passed || waited > patience_ns || self.pictures.len() > HELD {
             self.oldest()
         } else {
             None
@@ -175,6 +188,30 @@ mod tests {
         pairing.picture(picture(115));
         assert_eq!(of(pairing.oldest()), Some(3));
         assert!(pairing.oldest().is_none());
+    }
+
+    #[test]
+    fn late_stamps_are_set_right() {
+        let mut pairing = Pairing::late_by(0.2);
+        let mut pairs = Vec::new();
+        for k in 0..30 {
+            pairing.picture(picture(33 * k));
+            // It was taken 200 ms before.
+            if k >= 6 {
+                pairing.depth((33 * (k - 6) + 200) * MS, depth((k - 6) as u16));
+            }
+            while let Some(picture) = pairing.ready() {
+                let time_ns = picture.sensor_time_ns;
+                pairs.push((time_ns / MS / 33, of(Some(picture))));
+            }
+        }
+        assert!(pairs.len() >= 23, "{}", pairs.len());
+        assert!(
+            pairs
+                .iter()
+                .all(|(k, depth)| depth.map(i64::from) == Some(*k)),
+            "{pairs:?}"
+        );
     }
 
     #[test]

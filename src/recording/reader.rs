@@ -8,6 +8,7 @@ use super::cursor::Cursor;
 use super::error::RecordingError;
 use super::foreign::Foreign;
 use super::image::{Decoded, Picture, decode, decode_depth};
+use super::pairing::Pairing;
 use super::records::{MessageHead, Record, Records, first_bytes, summary};
 use super::ros::{self, Kind, ROS_UNIT_M};
 use super::schema::{
@@ -129,6 +130,12 @@ impl<R: Read + Seek> Reader<R> {
     /// Takes pictures alone from now on.
     pub fn leave_depth_out(&mut self) {
         self.wants_depth = false;
+    }
+
+    /// For depth images of other programs that are stamped so much later than they were taken, s. Those of our own
+    /// recordings lie with their pictures.
+    pub fn set_depth_late(&mut self, late_s: f64) {
+        self.foreign.pairing = Pairing::late_by(late_s);
     }
 
     /// Whether there is depth that is wanted, as far as is known by now.

@@ -69,6 +69,7 @@ impl WithDepth {
         shared: &Arc<Shared>,
     ) -> Result<Self, Failure> {
         shared.camera(|camera| camera.depth = Some(DepthCameraState::default()));
+        let late_s = depth.describe().depth.map_or(0.0, |format| format.late_s);
         let mut depth = Watched::if_live(depth, settings.time_limit()).map_err(Failure::Thread)?;
         let stop = Arc::new(AtomicBool::new(false));
         depth.stop_when(stop.clone());
@@ -90,7 +91,7 @@ impl WithDepth {
         Ok(Self {
             camera,
             images,
-            pairing: Pairing::default(),
+            pairing: Pairing::late_by(late_s),
             healths: VecDeque::new(),
             health: Health::default(),
             end: None,

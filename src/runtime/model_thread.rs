@@ -155,6 +155,7 @@ impl ModelThread {
                 self.picture = Some(picture);
             }
             ToModel::Tag(scale) => self.take_tag(scale),
+            ToModel::NoTag => self.job.config.tag.size_m = 0.0,
             ToModel::Markers(markers) => self.take_markers(markers),
             ToModel::Followed(followed) => *last = Some(self.step(followed)),
             ToModel::Searching {
@@ -193,7 +194,7 @@ impl ModelThread {
 
     /// A tag gives the scale: the first sights fix it for the whole capture, whose files have one unit.
     fn take_tag(&mut self, scale: TagScale) {
-        if self.tag.is_none() {
+        if self.tag.is_none() && self.job.config.tag.size_m > 0.0 {
             self.job.config.export.metres_per_px = scale.metres_per_px;
         }
         self.tag = Some(scale);
@@ -206,13 +207,17 @@ impl ModelThread {
         }
     }
 
-    /// Markers were found, or one was picked: the capture is to name them.
+    /// Markers were found, picked, or hung on each other: the capture is to name them.
     fn take_markers(&mut self, markers: Vec<MarkerWindow>) {
         let n = markers.len();
-        self.shared.tell(match n {
-            1 => "1 marker is followed".to_owned(),
-            n => format!("{n} markers are followed"),
-        });
+        let before = &self.job.config.markers.windows;
+        // Where others have become parents, that has been said.
+        if n != before.len() || markers == *before {
+            self.shared.tell(match n {
+                1 => "1 marker is followed".to_owned(),
+                n => format!("{n} markers are followed"),
+            });
+        }
         self.job.config.markers.windows = markers;
     }
 

@@ -5,7 +5,10 @@ use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use crate::config::MarkerWindow;
-use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame};
+use crate::depth::DepthLag;
+use crate::model::{
+    Control, DEPTH_APART_S, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame,
+};
 use crate::outline::{self, Scribbles};
 use crate::pipeline::{DecodeStage, Followed, FrontEnd, TagNews, Undecoded};
 use crate::source::DecodeError;
@@ -20,6 +23,8 @@ const MATTING_WIDTH: u32 = 960;
 const DAMAGE_REPORTED: u64 = 5;
 
 /// The warning where no tag is seen that was said to be there.
+const NO_TAG_BUT_DEPTH: &str =
+    "no tag of the family 36h11 is seen: lengths are by the depth of the film";
 const NO_TAG: &str = "no tag of the family 36h11 is seen: lengths stay in pixels; print it larger, with its \
                       white rim, or hang it in the light (--tag)";
 
@@ -30,6 +35,8 @@ pub enum ToModel {
     Followed(Followed),
     /// What the tag beside the trunk says.
     Tag(TagScale),
+    /// No tag is seen: a film with depth has the scale of that.
+    NoTag,
     /// The markers as they were given, found or picked.
     Markers(Vec<MarkerWindow>),
     /// The outline is still looked for: how far, and a picture to look at.
@@ -59,6 +66,8 @@ pub struct TrackThread<'a> {
     shared: &'a Shared,
     last_damage: Option<DecodeError>,
     picture: FirstPicture,
+    /// The user has heard that the clocks of colour and depth do not agree.
+    is_lag_said: bool,
     /// The markers cannot be followed: nothing more is to be made of what was filmed.
     is_refused: bool,
 }
@@ -79,6 +88,7 @@ impl<'a> TrackThread<'a> {
             shared,
             last_damage: None,
             picture: FirstPicture::default(),
+            is_lag_said: false,
             is_refused: false,
         }
     }
@@ -141,6 +151,7 @@ impl<'a> TrackThread<'a> {
                 self.decode.set_wants_colour(true);
                 self.front.pick_markers(places_px);
             }
+            Control::HangMarkers(places_px) => self.front.hang_markers(places_px),
             Control::Restart => self.restart(None),
             Control::BuildNow => drop(self.pass_on(ToModel::BuildNow)),
             Control::Export => drop(self.pass_on(ToModel::Export)),
@@ -289,6 +300,10 @@ impl<'a> TrackThread<'a> {
                     self.pass_on(ToModel::Tag(scale));
                 }
                 TagNews::Unseen(scale) => self.show_tag(scale, false),
+                TagNews::NoneSeen if self.front.has_depth() => {
+                    self.shared.warn(NO_TAG_BUT_DEPTH.into());
+                    self.pass_on(ToModel::NoTag);
+                }
                 TagNews::NoneSeen => self.shared.warn(NO_TAG.into()),
                 TagNews::Disputed(off_px) => self.shared.warn(dispute_line(off_px)),
             }
@@ -298,12 +313,22 @@ impl<'a> TrackThread<'a> {
         }
     }
 
+    /// Says once that depth images are of another moment than their pictures.
+    fn report_depth_lag(&mut self) {
+        let lag = self.front.depth_lag().filter(|_| !self.is_lag_said);
+        if let Some(line) = lag.as_ref().and_then(lag_line) {
+            self.is_lag_said = true;
+            self.shared.warn(line);
+        }
+    }
+
     fn show_tag(&self, scale: TagScale, is_seen: bool) {
         self.shared
             .camera(|camera| camera.tag = Some(TagState { scale, is_seen }));
     }
 
     fn report(&mut self) {
+        self.report_depth_lag();
         self.shared
             .counts
             .before_outline
@@ -330,6 +355,27 @@ fn dispute_line(off_px: f64) -> String {
         "what stands around the tree moves against the tag, by {off_px:.1} px so far: the camera's \
          motion is that of the tag alone from here on; the tag must hang still"
     )
+}
+
+/// The warning where the clocks of colour and depth do not agree, by the tree's motion in both.
+fn lag_line(lag: &DepthLag) -> Option<String> {
+    if lag.drifts() {
+        return Some(format!(
+            "the clocks of colour and depth do not run alike: by the tree's motion in both, depth falls behind by {:.1} \
+             ms each second; depths of what moves are of another moment: set the times right, or give --no-depth",
+            1000.0 * lag.drift
+        ));
+    }
+    let late_s = lag.late_s;
+    let word = if late_s > 0.0 { "later" } else { "earlier" };
+    lag.is_late().then(|| {
+        format!(
+            "by the tree's motion in both, depth images are stamped {:.3} s {word} than they were taken (within {DEPTH_APART_S} s): \
+             give --depth-late {:.3}",
+            late_s.abs(),
+            lag.given_s + late_s
+        )
+    })
 }
 
 /// What the user hears of a tag.

@@ -49,6 +49,13 @@ impl SaidOfDepth {
                  for the colours alone",
             ));
         };
+        camera.pinhole.check(picture).map_err(|why| {
+            let what = format!(
+                "its camera cannot be one: {why}; correct what the film says of it, or give --depth-camera FILE, or \
+                 --no-depth for the colours alone"
+            );
+            SourceError::bad_format(path, what)
+        })?;
         let given = Some(settings.unit_m).filter(|unit_m| *unit_m > 0.0 && !self.is_in_metres);
         let Some(unit_m) = given.or(self.unit_m) else {
             return Err(SourceError::bad_format(
@@ -71,6 +78,7 @@ impl SaidOfDepth {
                 pinhole: camera.pinhole,
                 distortion: camera.distortion,
                 unit_m,
+                late_s: settings.late_s,
             },
             picture,
             registration,

@@ -9,6 +9,11 @@ use std::path::{Path, PathBuf};
 /// What a capture has in its folder, beside pictures that are no film.
 const OF_A_CAPTURE: [&str; 2] = ["capture.json", "nodes.csv"];
 
+/// Beside a video fewer pictures than this are no film.
+const FEW_PICTURES: usize = 30;
+const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "bmp"];
+const VIDEOS: [&str; 6] = ["mkv", "mp4", "mov", "avi", "mcap", "bag"];
+
 /// Pictures that follow each other at a fixed rate.
 pub(super) struct Images {
     folder: PathBuf,
@@ -34,12 +39,19 @@ impl Images {
             ));
         }
         let entries = std::fs::read_dir(folder).map_err(|e| SourceError::of_file(folder, &e))?;
-        let mut files = Vec::new();
+        let (mut files, mut videos) = (Vec::new(), Vec::new());
         for entry in entries {
             let path = entry.map_err(|e| SourceError::of_file(folder, &e))?.path();
             if is_picture(&path) {
                 files.push(path);
+            } else if is_video(&path) {
+                videos.push(path);
             }
+        }
+        if let Some(video) = videos.iter().min().filter(|_| files.len() < FEW_PICTURES) {
+            let name = video.file_name().unwrap_or_default().to_string_lossy();
+            let what = format!("{name} is in it, and few pictures or none: give that file");
+            return Err(SourceError::bad_format(folder, what));
         }
         files.sort_by(|a, b| by_name(&a.to_string_lossy(), &b.to_string_lossy()));
         let Some(first) = files.first() else {
@@ -112,11 +124,20 @@ impl Source for Images {
 }
 
 fn is_picture(path: &Path) -> bool {
+    is_file_of(path, &PICTURES)
+}
+
+fn is_video(path: &Path) -> bool {
+    is_file_of(path, &VIDEOS)
+}
+
+/// Whether it is a file with one of these endings, and not hidden.
+fn is_file_of(path: &Path, endings: &[&str]) -> bool {
     let hidden = path
         .file_name()
         .is_none_or(|n| n.to_string_lossy().starts_with('.'));
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    !hidden && matches!(ending.as_deref(), Some("png" | "jpg" | "jpeg" | "bmp")) && path.is_file()
+    !hidden && ending.is_some_and(|e| endings.contains(&e.as_str())) && path.is_file()
 }
 
 /// Reads one picture; a JPEG stays one and is decoded where those of a camera are.

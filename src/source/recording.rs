@@ -50,6 +50,7 @@ impl Recording {
         if !settings.read {
             reader.leave_depth_out();
         }
+        reader.set_depth_late(settings.late_s);
         let mut recording = Self {
             path: path.to_owned(),
             reader,

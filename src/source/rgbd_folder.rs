@@ -90,7 +90,10 @@ impl RgbdFolder {
     }
 
     fn take_depth(&mut self, settings: &config::Depth) -> Result<(), SourceError> {
-        let listed = read_list(&self.folder, DEPTHS)?;
+        let mut listed = read_list(&self.folder, DEPTHS)?;
+        listed
+            .iter_mut()
+            .for_each(|depth| depth.time_s -= settings.late_s);
         if listed.is_empty() {
             return Err(SourceError::bad_format(
                 &self.folder,

@@ -32,6 +32,7 @@ pub fn awaited(state: &State) -> Awaited {
             Subject::Outline => "draw round the tree: click or space sets corners, Enter closes",
             Subject::Branch => "draw from a branch's base to its tip: click or space, then Enter",
             Subject::Markers => "click on the middle of each marker, then Enter",
+            Subject::MarkerOrder => "click on markers in turn, away from the foot, then Enter",
         });
     }
     if state.paused {

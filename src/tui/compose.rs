@@ -145,7 +145,7 @@ pub fn letters(state: &State, placed: &Placed) -> Option<Vec<Vec<char>>> {
     letters.strokes(&strokes);
     let letter = match drawing.subject() {
         Subject::Outline => '#',
-        Subject::Branch | Subject::Markers => STROKE_LETTER,
+        Subject::Branch | Subject::Markers | Subject::MarkerOrder => STROKE_LETTER,
     };
     if drawing.is_joined() {
         for [a, b] in edges(drawing.points_px(), drawing.is_closed()) {

@@ -13,6 +13,8 @@ pub enum Subject {
     Branch,
     /// Coloured markers, each by a point.
     Markers,
+    /// Which of the markers hang on which: a line from marker to marker, away from the foot.
+    MarkerOrder,
 }
 
 impl Subject {
@@ -22,6 +24,7 @@ impl Subject {
             Subject::Outline => "the outline",
             Subject::Branch => "a line along a branch",
             Subject::Markers => "coloured markers",
+            Subject::MarkerOrder => "the order of markers",
         }
     }
 }
@@ -97,7 +100,10 @@ impl Drawing {
             Subject::Markers if self.points_px.is_empty() => {
                 Err("Click on a marker first, or leave with Esc.")
             }
-            Subject::Branch | Subject::Markers => Ok(self.points_px.clone()),
+            Subject::MarkerOrder if self.points_px.len() < 2 => {
+                Err("Click on a marker and on the next one away from the foot, or leave with Esc.")
+            }
+            Subject::Branch | Subject::Markers | Subject::MarkerOrder => Ok(self.points_px.clone()),
         }
     }
 

@@ -69,7 +69,7 @@ pub const fn bind<A>(
 }
 
 /// Keys while watching; those without a short name repeat what another one does.
-pub const WATCHING: [Binding<Action>; 20] = [
+pub const WATCHING: [Binding<Action>; 21] = [
     bind(
         KeyCode::Char('?'),
         "?",
@@ -146,8 +146,15 @@ pub const WATCHING: [Binding<Action>; 20] = [
         KeyCode::Char('c'),
         "c",
         "colour",
-        "picks coloured markers, which are followed from then on",
+        "picks coloured markers to follow; p says which hang on which",
         Action::Draw(Subject::Markers),
+    ),
+    bind(
+        KeyCode::Char('p'),
+        "p",
+        "parents",
+        "",
+        Action::Draw(Subject::MarkerOrder),
     ),
     bind(KeyCode::Char('l'), "", "", "", Action::Turn(1)),
     bind(KeyCode::Char('k'), "", "", "", Action::Choose(-1)),
@@ -298,7 +305,7 @@ fn act(action: Action, state: &mut State, placed: Option<&Placed>) -> Option<Con
         }
         Action::Draw(subject) => {
             match subject {
-                Subject::Outline | Subject::Markers => state.unsay(),
+                Subject::Outline | Subject::Markers | Subject::MarkerOrder => state.unsay(),
                 Subject::Branch => state.say(wood::told(&state.snapshot)),
             }
             begin_drawing(subject, state, placed);
@@ -420,6 +427,10 @@ fn use_drawn(subject: Subject, points_px: Vec<Point2<f64>>, state: &mut State) -
         Subject::Markers => {
             state.say(format!("Asked to follow {n} more markers."));
             Control::PickMarkers(points_px)
+        }
+        Subject::MarkerOrder => {
+            state.say(format!("Asked to hang {n} markers on each other."));
+            Control::HangMarkers(points_px)
         }
     }
 }

@@ -94,7 +94,7 @@ impl State {
     pub fn shown_wood(&self) -> Option<&BranchGraph> {
         let is_shown = match self.drawing.as_ref().map(Drawing::subject) {
             Some(Subject::Branch) => true,
-            Some(Subject::Outline | Subject::Markers) => false,
+            Some(Subject::Outline | Subject::Markers | Subject::MarkerOrder) => false,
             None => self.wood,
         };
         let wood = self.snapshot.wood.as_ref().filter(|_| is_shown)?;

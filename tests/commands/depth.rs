@@ -219,6 +219,17 @@ fn what_is_missing_is_said_in_one_line() {
     };
     refused(&["--depth-unit", "5000"], BAD_USAGE, "metres of one count");
     refused(&["--depth-camera", "rgb.txt"], BAD_USAGE, "it is no camera");
+    refused(&["--depth-late", "0.3"], BAD_USAGE, "give seconds, -0.25");
+    let sound = fs::read_to_string(film.path("camera.json")).expect("camera");
+    let lost_digit = sound.replace(&format!(r#""fy": {FOCAL_PX}"#), r#""fy": 6.5"#);
+    assert_ne!(lost_digit, sound);
+    fs::write(film.path("camera.json"), lost_digit).expect("camera");
+    refused(
+        &[],
+        NO_INPUT,
+        "its camera cannot be one: its focal lengths are",
+    );
+    fs::write(film.path("camera.json"), sound).expect("camera");
     fs::rename(film.path("camera.json"), film.path("mine.json")).expect("renamed");
     refused(&[], NO_INPUT, "put a camera.json");
     is_done(&film.replay(".", "given", &["--depth-camera", "mine.json"]));
@@ -227,6 +238,23 @@ fn what_is_missing_is_said_in_one_line() {
     let late: String = depths.replace("\n1", "\n2");
     fs::write(film.path("depth.txt"), late).expect("list");
     refused(&[], NO_INPUT, "the clocks of colour and depth do not meet");
+    // Stamps that are late can be set right: the first frames have depth then.
+    let listed: Vec<(f64, &str)> = depths
+        .lines()
+        .skip(1)
+        .filter_map(|line| line.split_once(' '))
+        .map(|(time, file)| (time.parse().expect("a time"), file))
+        .collect();
+    let late: String = listed
+        .iter()
+        .map(|(time_s, file)| format!("{:.6} {file}\n", time_s + 0.2))
+        .collect();
+    fs::write(film.path("depth.txt"), late).expect("list");
+    is_done(&film.replay(".", "late", &[]));
+    is_done(&film.replay(".", "right", &["--depth-late", "0.2"]));
+    let depth_of_first = |capture: &str| film.table(capture, "tracks.csv")[1][6].clone();
+    assert_eq!(depth_of_first("late"), "");
+    assert_ne!(depth_of_first("right"), "");
     fs::write(film.path("depth.txt"), "12 a b\nx\n").expect("list");
     refused(&[], NO_INPUT, "line 2 is not a time");
     // A stream that stops is used as far as it goes.

@@ -61,6 +61,7 @@ fn our_own_depth_comes_back_to_the_byte() {
         },
         distortion: [0.5, -2.6, 0.001, -0.0003, 1.5, 0.38, -2.4, 1.45],
         unit_m: 0.000_25,
+        late_s: 0.0,
     };
     let head = Head {
         source: "test".into(),

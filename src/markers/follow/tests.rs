@@ -313,3 +313,57 @@ fn a_marker_is_picked_in_a_later_frame() {
         [MarkerEvent::NotTaken { .. }]
     ));
 }
+
+#[test]
+fn the_user_says_which_markers_hang_on_which() {
+    let places = [[60.0, 105.0], [80.0, 65.0], [110.0, 25.0]];
+    let mut tracker = begun(&places, &settings(&places)).expect("markers");
+    let near = |k: usize| Point2::from(places[k]) + Vector2::new(9.0, -7.0);
+    tracker.hang(&[near(0), near(1), near(1), near(2)], 24.0);
+    let parents = |tracker: &MarkerTracker| -> Vec<Option<String>> {
+        tracker.windows().into_iter().map(|w| w.parent).collect()
+    };
+    let names: Vec<String> = tracker.windows().into_iter().map(|w| w.name).collect();
+    let chain = vec![None, Some(names[0].clone()), Some(names[1].clone())];
+    assert_eq!(parents(&tracker), chain);
+    let events = tracker.take_events();
+    assert_eq!(
+        events,
+        [MarkerEvent::Hung {
+            names: names.clone()
+        }]
+    );
+    assert!(!events[0].is_warning());
+    // A ring, and a click where no marker is, change nothing.
+    tracker.hang(&[near(2), near(0)], 24.0);
+    tracker.hang(&[near(0), Point2::new(10.0, 10.0)], 24.0);
+    assert_eq!(parents(&tracker), chain);
+    let said: Vec<String> = tracker
+        .take_events()
+        .iter()
+        .map(ToString::to_string)
+        .collect();
+    assert!(said[0].contains("form a ring"), "{said:?}");
+    assert!(said[1].contains("no marker is near 10, 10 px"), "{said:?}");
+}
+
+#[test]
+fn a_correction_in_a_frame_that_never_comes_is_said() {
+    let mut settings = settings(&[[100.0, 90.0]]);
+    let name = settings.windows[0].name.clone();
+    for frame in [1, 99] {
+        settings.corrections.push(MarkerCorrection {
+            marker: name.clone(),
+            frame,
+            at_px: [100.0, 90.0],
+        });
+    }
+    let still = picture(&[[100.0, 90.0]], RED);
+    let mut tracker = begun(&[[100.0, 90.0]], &settings).expect("markers");
+    for k in 0..4 {
+        tracker.step(k, 0.1 * k as f64, &still, &NoScene);
+    }
+    tracker.finish();
+    let unused = MarkerEvent::CorrectionUnused { name, frame: 99 };
+    assert_eq!(tracker.take_events(), [unused]);
+}

@@ -469,3 +469,21 @@ fn a_notice_goes_when_the_capture_speaks_or_with_time() {
     }));
     assert_eq!(newest(&run.state), "Exported.");
 }
+
+#[test]
+fn markers_are_picked_and_hung_on_each_other_by_clicks() {
+    let enter = || key(KeyCode::Enter);
+    let (low, high) = (click(3, 21), click(66, 4));
+    let places: Vec<Point2<f64>> = vec![[4.5, 349.5].into(), [634.5, 9.5].into()];
+    let picked = play(
+        Some(wide()),
+        &[letter('c'), low.clone(), high.clone(), enter()],
+    );
+    assert_eq!(picked.sent, [Control::PickMarkers(places.clone())]);
+    let hung = play(Some(wide()), &[letter('p'), low.clone(), high, enter()]);
+    assert_eq!(hung.sent, [Control::HangMarkers(places)]);
+    // One alone hangs on nothing.
+    let one = play(Some(wide()), &[letter('p'), low, enter()]);
+    assert_eq!(one.sent, []);
+    assert!(one.state.drawing.is_some());
+}
