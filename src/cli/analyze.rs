@@ -5,8 +5,10 @@ mod options;
 mod written;
 
 use super::command_error::CommandError;
+use super::markers::MarkerFile;
 use super::output::{eprint_line, print};
 use super::stop::Stop;
+use super::unused;
 use crate::cancel::CancelToken;
 use crate::config::{Config, ConfigError, Excited};
 use crate::document::{Document, DocumentError, MarkedTree};
@@ -36,6 +38,10 @@ const MAX_PART_S: f64 = 600.0;
 const LEAST_CUT_S: f64 = 1.0;
 /// A marker that was seen in less than this share of the frames is named.
 const SELDOM_SEEN: f64 = 0.5;
+/// And one that moves by less than this share of what markers do.
+const STANDS_STILL: f64 = 0.02;
+/// Two scales that are farther from each other than this share are not of one film.
+const ONE_SCALE: f64 = 0.1;
 /// A frame is read within this share of the time to the next: times of frames jitter.
 const LONGEST_READOUT: f64 = 1.1;
 
@@ -116,12 +122,22 @@ fn warning(args: &AnalyzeArgs, comparison: &Comparison) -> Option<&'static str> 
 /// once.
 fn read_documents(args: &AnalyzeArgs) -> Result<Vec<Document>, CommandError> {
     let mut documents = Vec::with_capacity(args.dirs.len());
+    if args.marker_file().is_some_and(MarkerFile::has_corrections) {
+        unused::note(
+            "corrections in the file of --markers",
+            "they set places while a film is read; give the file to `replay`",
+        );
+    }
     for dir in &args.dirs {
         let document = match args.by_markers() {
             true => Document::for_markers(dir)?,
             false => Document::tree(dir)?,
         };
-        args.scale.check_size(document.skeleton.image_size)?;
+        let size = document.skeleton.image_size;
+        args.scale.check_size(size)?;
+        if let Some(file) = args.marker_file() {
+            file.check_size(size)?;
+        }
         documents.push(document);
     }
     Ok(documents)
@@ -209,12 +225,18 @@ fn analyse_capture(
     for warning in &document.warnings {
         notes.add("warning", warning.clone());
     }
+    if let Some(other) = other_scale(args, document) {
+        notes.add("warning", other);
+    }
     let marked = marked_tree(args, document, &config)?;
     if let Some(unsure) = marked.as_ref().and_then(unsure_parents) {
         notes.add("note", unsure);
     }
     if let Some(lost) = marked.as_ref().and_then(often_lost) {
         notes.add("warning", lost);
+    }
+    if let Some(still) = marked.as_ref().and_then(standing_still) {
+        notes.add("note", still);
     }
     if args
         .marker_parents()
@@ -432,6 +454,36 @@ fn often_lost(marked: &MarkedTree) -> Option<String> {
             each.join(", ")
         )
     })
+}
+
+/// The warning where the user gives a scale that is not that of the capture.
+fn other_scale(args: &AnalyzeArgs, document: &Document) -> Option<String> {
+    let own = document.metres_per_px();
+    let mut config = Config::default();
+    args.scale.set(&mut config);
+    let given = config.export.metres_per_px;
+    let is_other = own > 0.0 && given > 0.0 && (given / own).ln().abs() > ONE_SCALE;
+    is_other.then(|| {
+        format!(
+            "a pixel is {given:.5} m long by the given scale, and {own:.5} m by the capture; the given one counts: see \
+             that it is right"
+        )
+    })
+}
+
+/// What is to be said of markers that hardly move: one may be no marker, and not on the tree.
+fn standing_still(marked: &MarkedTree) -> Option<String> {
+    let still = marked.standing(STANDS_STILL);
+    let first = still.first()?;
+    let names: Vec<&str> = still.iter().map(|marker| marker.name.as_str()).collect();
+    Some(format!(
+        "markers that hardly move, {} by {:.1} px where markers move by {:.1} px: {}; if one is not on the tree, leave \
+         it out with a file of the others, --markers=FILE",
+        first.name,
+        first.moves_px,
+        first.usual_px,
+        names.join(", ")
+    ))
 }
 
 /// What is to be said of markers whose parents follow from the motion, but not for certain.

@@ -14,6 +14,7 @@ use crate::dynamics::Film;
 use crate::model::{
     Foot, JointPose, Node, NodeId, NodeKind, NodeName, Pose, Skeleton, TrackId, Unidentified,
 };
+use crate::signal::median;
 use crate::signal::statistics::median_vector;
 use nalgebra::{Point2, Point3, Quaternion, UnitQuaternion, Vector3, Vector4};
 use std::collections::BTreeMap;
@@ -42,6 +43,15 @@ pub struct SeldomSeen {
     pub name: String,
     /// In so many frames.
     pub seen: usize,
+}
+
+/// A marker that stands still while others move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StillMarker {
+    pub name: String,
+    /// Standard deviation of its place, and the median of those of all markers, px.
+    pub moves_px: f64,
+    pub usual_px: f64,
 }
 
 /// A marker that was seen.
@@ -88,7 +98,7 @@ impl Document {
     }
 
     /// The tree of the markers in the last `window_s` seconds of what lies between two times, s. Who is
-    /// whose parent follows from `parents`, which are of the same names; without them from what the
+    /// whose parent follows from `parents`, which are of the same names, and leave out who is not among them; without them from what the
     /// capture was given; and where that says nothing, from the motion: a marker's parent is the next one
     /// towards the foot on the branches of the tree of all points, on which it lies in the picture.
     ///
@@ -118,16 +128,17 @@ impl Document {
                 });
             }
         }
+        if let Some(parents) = parents {
+            self.check_names(given, parents)?;
+            seen.retain(|own| parents.iter().any(|named| named.name == own.given.name));
+        }
         if seen.is_empty() {
             return Err(DocumentError::NoMarkers {
                 dir: self.dir.clone(),
             });
         }
         let by_hand_of = match parents {
-            Some(parents) => {
-                self.check_names(given, parents)?;
-                Some(by_hand(&seen, parents))
-            }
+            Some(parents) => Some(by_hand(&seen, parents)),
             None if given.iter().any(|m| m.parent.is_some()) => Some(by_hand(&seen, given)),
             None => None,
         };
@@ -237,6 +248,27 @@ impl MarkedTree {
             }
         }
         seldom
+    }
+
+    /// The markers that move by less than `share` of what markers usually do.
+    pub fn standing(&self, share: f64) -> Vec<StillMarker> {
+        let tracks = self.film.tracks.iter();
+        let all_px: Vec<f64> = tracks.map(|track| track.spread_px()).collect();
+        let usual_px = median(all_px.clone(), f64::total_cmp).unwrap_or(0.0);
+        let mut still = Vec::new();
+        for (track, moves_px) in self.film.tracks.iter().zip(all_px) {
+            let name = self
+                .names
+                .get(&self.skeleton.nodes[track.node.index()].name);
+            if let Some(name) = name.filter(|_| moves_px < share * usual_px) {
+                still.push(StillMarker {
+                    name: name.clone(),
+                    moves_px,
+                    usual_px,
+                });
+            }
+        }
+        still
     }
 
     /// The poses of the tree in the frames of a part of its film, of which `skeleton` is where it rests: each

@@ -37,7 +37,7 @@ pub use forest::{
     FOREST_FILE, FOREST_TREES_FILE, ForestDocument, ForestFileBytes, ForestNote, ForestOrigin,
     GROUND_FILE, GroundNote, MOST_GROUND_SAMPLES,
 };
-pub use marked::{MarkedTree, SeldomSeen};
+pub use marked::{MarkedTree, SeldomSeen, StillMarker};
 pub use modes::{MODES_FILE, modes};
 pub use motion::{FILE as MOTION_FILE, MOTION_HEADER, MotionCsv};
 pub use nodes::{nodes, nodes_header};
@@ -287,7 +287,11 @@ impl Document {
     /// Whether how its branches sway was measured on this tree: in its own film, or in one that was laid on its
     /// scan. A grown tree has the sway of its example.
     pub fn has_measured_sway(&self) -> bool {
-        let film_on_scan = self.note.scan.is_some_and(|scan| scan.film.is_some());
+        let film_on_scan = self
+            .note
+            .scan
+            .as_ref()
+            .is_some_and(|scan| scan.film.is_some());
         (film_on_scan || self.has_tracks()) && self.sway.iter().any(Result::is_ok)
     }
 

@@ -2,9 +2,8 @@
 
 use super::members::mean_px;
 use crate::model::{LogWindow, NodeId, Skeleton, TrackId};
-use crate::signal::statistics::median_vector;
-use crate::signal::statistics::nth_smallest;
-use nalgebra::Point2;
+use crate::signal::statistics::{median_vector, nth_smallest, rms};
+use nalgebra::{Point2, Vector2};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -27,6 +26,14 @@ impl FilmTrack {
         let seen = self.at_px.iter().filter(|at| at.x.is_finite());
         seen.clone().next()?;
         Some(median_vector(seen.map(|at| at.coords)).into())
+    }
+
+    /// Standard deviation of its place, px; 0 where it was never seen.
+    pub fn spread_px(&self) -> f64 {
+        let seen = self.at_px.iter().filter(|at| at.x.is_finite());
+        let n = seen.clone().count().max(1) as f64;
+        let middle = seen.clone().map(|at| at.coords).sum::<Vector2<f64>>() / n;
+        rms(seen.map(|at| (at.coords - middle).norm()))
     }
 
     /// Some of the frames; not seen in those that it does not have.

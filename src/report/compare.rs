@@ -2,7 +2,7 @@
 //! al. sect. 5.4).
 
 use super::matching::{Landmark, Match, MatchedBy, View, is_same_mode, matched};
-use super::study::Study;
+use super::study::{Branch, Study};
 use crate::model::{Interval, Sway};
 
 /// Captures are of one tree if this share of the branches that could be found again is found again,
@@ -292,8 +292,14 @@ impl Row {
         matches!(self.matches.first(), Some(Match::First { .. }))
     }
 
+    /// What it is called in the capture that shows it first.
+    pub fn called(&self, studies: &[Study]) -> String {
+        let first = (0..studies.len()).find_map(|k| self.branch(studies, k));
+        first.map_or_else(|| self.name.to_string(), Branch::called)
+    }
+
     /// The branch in capture `k`, the first being 0.
-    pub fn branch<'a>(&self, studies: &'a [Study], k: usize) -> Option<&'a super::Branch> {
+    pub fn branch<'a>(&self, studies: &'a [Study], k: usize) -> Option<&'a Branch> {
         let branch = self.matches.get(k)?.branch()?;
         studies.get(k)?.branches.get(branch)
     }

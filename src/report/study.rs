@@ -263,6 +263,11 @@ impl Study {
 }
 
 impl Branch {
+    /// What it is called where captures are compared: its marker, else its node as in `nodes.csv`.
+    pub fn called(&self) -> String {
+        self.marker.clone().unwrap_or_else(|| self.name.to_string())
+    }
+
     /// What is known of its sway.
     pub fn known(&self) -> Option<Sway> {
         self.sway.ok()

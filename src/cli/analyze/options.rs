@@ -136,15 +136,15 @@ pub struct FileAsked<'a> {
 
 /// Markers with their parents, from a file.
 #[derive(Clone, Debug)]
-struct MarkerParents(Vec<MarkerWindow>);
+struct MarkerParents(MarkerFile);
 
 impl FromStr for MarkerParents {
     type Err = String;
 
     fn from_str(path: &str) -> Result<Self, String> {
-        let markers = MarkerFile::read(path)?.markers;
-        check_marker_names(&markers).map_err(|e| e.to_string())?;
-        Ok(Self(markers))
+        let file = MarkerFile::read(path)?;
+        check_marker_names(&file.markers).map_err(|e| e.to_string())?;
+        Ok(Self(file))
     }
 }
 
@@ -235,8 +235,13 @@ impl AnalyzeArgs {
 
     /// The parents of markers that a file names.
     pub fn marker_parents(&self) -> Option<&[MarkerWindow]> {
-        let file = self.markers.as_ref()?.as_ref()?;
-        Some(&file.0)
+        Some(&self.marker_file()?.markers)
+    }
+
+    /// The file that names them.
+    pub fn marker_file(&self) -> Option<&MarkerFile> {
+        let parents = self.markers.as_ref()?.as_ref()?;
+        Some(&parents.0)
     }
 
     /// Begin and end of the analysed part of the film, s.

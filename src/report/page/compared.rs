@@ -93,7 +93,7 @@ fn by_branch(studies: &[Study], rows: &[&Row], of: ValueOf) -> Vec<Slot> {
             }
         }
         slots.push(Slot {
-            name: row.name.to_string(),
+            name: row.called(studies),
             marks,
         });
     }
@@ -130,7 +130,7 @@ fn table(studies: &[Study], comparison: &Comparison) -> String {
         if row.is_told(studies) {
             rows.extend((0..studies.len()).map(|k| table_row(studies, row, k)));
         } else {
-            untold.push(row.name.to_string());
+            untold.push(escaped(&row.called(studies)));
         }
     }
     let untold = if untold.is_empty() {
@@ -156,7 +156,7 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         format!(
             "<td class=\"n\" rowspan=\"{}\">{}</td>",
             studies.len(),
-            row.name
+            escaped(&row.called(studies))
         )
     } else {
         String::new()
@@ -166,7 +166,7 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
         (None, _) => without_values(name, "-", lost(row, k)),
         (Some(b), None) => {
             let reason = b.sway.err().map_or(String::new(), |w| format!("none: {w}"));
-            without_values(name, &b.name.to_string(), &reason)
+            without_values(name, &escaped(&b.called()), &reason)
         }
         (Some(b), Some(sway)) => {
             let first = row.sway(studies, 0).filter(|_| k > 0);
@@ -176,7 +176,7 @@ fn table_row(studies: &[Study], row: &Row, k: usize) -> String {
             });
             let row = [
                 name,
-                b.name.to_string(),
+                escaped(&b.called()),
                 stacked(&interval(&sway.frequency_hz, 3)),
                 sway.damping_ratio
                     .map_or("unknown".into(), |d| stacked(&interval(&d, 3))),
@@ -219,10 +219,11 @@ fn overlay(studies: &[Study], row: &Row) -> String {
     if curves.len() < 2 {
         return String::new();
     }
-    let title = format!("Spectra of branch {}", row.name);
+    let called = row.called(studies);
+    let title = format!("Spectra of branch {called}");
     figure(
         spectra(&curves, highest_hz(&all), &title),
-        &format!("Branch {}.", row.name),
+        &format!("Branch {}.", escaped(&called)),
     )
 }
 

@@ -4,7 +4,7 @@ use crate::model::Sway;
 use crate::report::columns::{Table, wrapped};
 use crate::report::compare::{Change, Comparison, Row};
 use crate::report::matching::Match;
-use crate::report::study::Study;
+use crate::report::study::{Branch, Study};
 use crate::report::values::{changed, interval};
 
 /// What the captures have in common and where they differ; on a narrow terminal frequency and
@@ -30,7 +30,7 @@ pub fn compared(studies: &[Study], comparison: &Comparison, columns: Option<usiz
     }
     let mut notes = String::new();
     if !untold.is_empty() {
-        let untold: Vec<String> = untold.iter().map(|row| row.name.to_string()).collect();
+        let untold: Vec<String> = untold.iter().map(|row| row.called(studies)).collect();
         notes += &format!(
             "  without a frequency in any of them: {}\n",
             untold.join(", ")
@@ -142,7 +142,7 @@ fn damping_of(sway: &Sway, first: Option<&Sway>) -> (String, Option<Change>) {
 fn across(studies: &[Study], row: &Row, k: usize, values: &[Value]) -> Vec<String> {
     let mut cells = vec![
         if k == 0 {
-            row.name.to_string()
+            row.called(studies)
         } else {
             String::new()
         },
@@ -152,7 +152,7 @@ fn across(studies: &[Study], row: &Row, k: usize, values: &[Value]) -> Vec<Strin
         cells.extend(["-".into(), format!("  {}", lost(row, k))]);
         return cells;
     };
-    cells.push(branch.name.to_string());
+    cells.push(branch.called());
     let sway = match branch.sway {
         Ok(sway) => sway,
         Err(why) => {
@@ -180,6 +180,13 @@ pub fn lost(row: &Row, k: usize) -> &'static str {
     }
 }
 
+/// What branches of a capture are called, by their nodes.
+fn called(study: &Study, nodes: &[u32]) -> Vec<String> {
+    let branches = study.branches.iter();
+    let named = branches.filter(|branch| nodes.contains(&branch.name));
+    named.map(Branch::called).collect()
+}
+
 /// Branches of the first capture and of the one after `other` more that stand for nothing in each
 /// other, a line a reason.
 pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> String {
@@ -189,8 +196,8 @@ pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> St
     let (mut missing, mut unclear) = (Vec::new(), Vec::new());
     for row in comparison.rows_of_first() {
         match row.matches.get(other + 1) {
-            Some(Match::Missing) => missing.push(row.name),
-            Some(Match::Unclear) => unclear.push(row.name),
+            Some(Match::Missing) => missing.push(row.called(studies)),
+            Some(Match::Unclear) => unclear.push(row.called(studies)),
             _ => {}
         }
     }
@@ -207,13 +214,12 @@ pub fn unmatched(studies: &[Study], comparison: &Comparison, other: usize) -> St
         ),
         (
             format!("branches of {name} that {first} does not have"),
-            left.cloned().unwrap_or_default(),
+            called(study, left.map_or(&[], Vec::as_slice)),
         ),
     ];
     let mut out = String::new();
     for (what, names) in lists {
         if !names.is_empty() {
-            let names: Vec<String> = names.iter().map(u32::to_string).collect();
             out += &format!("  {what}: {}\n", names.join(", "));
         }
     }
