@@ -328,6 +328,7 @@ def cloud(ply, document, side, out):
 
 
 NO_GROUND_M = 0.35  # above the foot, on a slope
+TRUNK_RADII = 1.3  # nearer to the trunk's middle there is no ground
 WOOD, POINT, UNKNOWN = (150, 118, 90), (30, 80, 210), (190, 190, 190)
 
 
@@ -340,8 +341,11 @@ class Scanned:
         raw, self.height = Path(ply).read_bytes(), int(height)
         points = np.frombuffer(raw[raw.index(b"end_header\n") + 11 :], "<f8").reshape(-1, 3)
         self.cylinders = rows(qsm)
-        foot = min(float(c["startZ"]) for c in self.cylinders)
-        self.points = points[points[:, 2] > foot + NO_GROUND_M]
+        lowest = min(self.cylinders, key=lambda c: float(c["startZ"]))
+        foot = float(lowest["startZ"])
+        off_trunk = np.hypot(points[:, 0] - float(lowest["startX"]), points[:, 1] - float(lowest["startY"]))
+        on_trunk = (off_trunk < TRUNK_RADII * float(lowest["radius"])) & (points[:, 2] > foot)
+        self.points = points[(points[:, 2] > foot + NO_GROUND_M) | on_trunk]
         self.low, self.top = self.points[:, 0].min() - 0.2, self.points[:, 2].max() + 0.2
         self.px_per_m = (self.height - 1) / (self.top - foot + 0.1)
         self.width = int((self.points[:, 0].max() + 0.2 - self.low) * self.px_per_m)

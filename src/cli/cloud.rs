@@ -9,8 +9,10 @@ use super::common::parse_within;
 use super::output::eprint_line;
 use super::stop::Stop;
 use super::unused;
-use crate::cloud::{CloudMethod, CloudOptions, CloudTree, CloudTrees, trees_of_cloud, verdict};
-use crate::config::Config;
+use crate::cloud::{
+    CloudMethod, CloudOptions, CloudTree, CloudTrees, Colonisation, trees_of_cloud, verdict,
+};
+use crate::config::{self, Config};
 use crate::document::Document;
 use crate::files::check_place;
 use crate::import::{
@@ -20,8 +22,8 @@ use crate::model::{PointCloud, Verdict};
 use crate::outline;
 use crate::pipeline::stand_scanned;
 use crate::views::{
-    DrawnTree, FilmFit, FilmOnScan, Grounds, filmed_points, register_film, scan_defaults,
-    sway_on_scan,
+    DrawnTree, FilmFit, FilmOnScan, Grounds, ScanSway, filmed_points, odd_pair_of, register_film,
+    scan_defaults, sway_on_scan,
 };
 use anyhow::{Context, anyhow};
 use clap::{Args, ValueEnum};
@@ -58,7 +60,7 @@ pub struct CloudArgs {
     /// The tree was scanned in leaf: take the leaves off first.
     #[arg(long)]
     in_leaf: bool,
-    /// Of several trees only this one, by its number from 1 on: the one with most points is the first.
+    /// Of several trees only this one, by its number from 1 on: the largest is the first.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     tree: Option<u64>,
     /// Of several trees, write all points with the numbers of their trees (points.ply).
@@ -84,16 +86,39 @@ pub struct CloudArgs {
 enum Method {
     /// By the shortest ways from the foot along the wood.
     Paths,
-    /// By space colonisation (Runions et al. 2007).
+    /// By space colonisation along the wood.
     Colonisation,
+    /// By space colonisation of the bare points, as Runions et al. 2007 have it.
+    Runions,
 }
 
-impl From<Method> for CloudMethod {
-    fn from(method: Method) -> Self {
-        match method {
-            Method::Paths => Self::Paths,
-            Method::Colonisation => Self::Colonisation,
+impl Method {
+    /// The method with its lengths by the settings.
+    fn with(self, settings: &config::Cloud) -> CloudMethod {
+        match self {
+            Self::Paths => CloudMethod::Paths,
+            Self::Colonisation => {
+                CloudMethod::Colonisation(lengths(settings, Colonisation::ALONG_WOOD))
+            }
+            Self::Runions => CloudMethod::Runions(lengths(settings, Colonisation::BARE)),
         }
+    }
+}
+
+/// The lengths of space colonisation by the settings; 0 there is that of the method. What draws is farther than what is
+/// reached.
+fn lengths(settings: &config::Cloud, usual: Colonisation) -> Colonisation {
+    let [kill_steps, influence_steps] = [settings.kill_steps, settings.influence_steps];
+    let is_given = |steps: &f64| *steps > 0.0;
+    let kill_steps = Some(kill_steps)
+        .filter(is_given)
+        .unwrap_or(usual.kill_steps);
+    let farther = usual.influence_steps.max(2.0 * kill_steps);
+    let influence_steps = Some(influence_steps).filter(is_given).unwrap_or(farther);
+    Colonisation {
+        step_cells: settings.step_cells,
+        kill_steps,
+        influence_steps,
     }
 }
 
@@ -148,8 +173,15 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         too_few_said,
     } = read(&args.file, args.unit.map(Unit::metres))?;
     print_units(units_in_file);
+    let method = args.method.unwrap_or(Method::Paths);
+    if method == Method::Paths && config.cloud != config::Cloud::default() {
+        unused::note(
+            "[cloud] of the settings",
+            "it is of --method colonisation and runions",
+        );
+    }
     let options = CloudOptions {
-        method: args.method.unwrap_or(Method::Paths).into(),
+        method: method.with(&config.cloud),
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
         in_leaf: args.in_leaf,
     };
@@ -323,9 +355,12 @@ impl CloudArgs {
         let verdict = drawn.note.verdict.clone();
         drawn.write_with_film(&self.out, &film, is_stopped)?;
         eprint_line(&format!(
-            "{}; {swaying} of {pieces} pieces of branches carry its frequencies",
+            "{}; {swaying} of {pieces} pieces of branches carry its frequencies (a piece leads from fork to fork)",
             lies_on(&film.fit)
         ));
+        for line in film.whereabouts() {
+            eprint_line(&line);
+        }
         Ok(verdict)
     }
 
@@ -372,8 +407,11 @@ impl CloudArgs {
         let pairs = pairs.as_ref().map(|pairs| pairs.0.as_slice());
         let found = register_film(tree, film, pairs);
         let fit = found.filter(FilmFit::holds).ok_or_else(|| {
-            let what = match self.pairs {
-                Some(_) => pairs_say_too_little(found.as_ref()),
+            let what = match &self.pairs {
+                Some(pairs) => {
+                    let why = pairs_say_too_little(found.as_ref());
+                    why + &odd_pair_said(pairs, film).unwrap_or_default()
+                }
                 None => "it is not found from where it was filmed; if it is of this tree, give three places in both \
                          with --pairs"
                     .to_owned(),
@@ -381,7 +419,7 @@ impl CloudArgs {
             CommandError::Failed(anyhow!("--film {}: {what}", film.dir.display()))
         })?;
         let metres_per_px = document.note.config.export.metres_per_px;
-        let sway = sway_on_scan(
+        let ScanSway { sway, laid } = sway_on_scan(
             &document.skeleton,
             metres_per_px,
             film,
@@ -392,6 +430,7 @@ impl CloudArgs {
         Ok(FilmOnScan {
             fit,
             sway,
+            laid,
             has_tag,
             film_metres_per_px: film.note.config.export.metres_per_px,
         })
@@ -438,6 +477,15 @@ fn pairs_say_too_little(fit: Option<&FilmFit>) -> String {
                  roll that no film has; check them, or give more"
             .to_owned(),
     }
+}
+
+/// Which of the pairs does not fit the others, where one alone does not.
+fn odd_pair_said(pairs: &Pairs, film: &Document) -> Option<String> {
+    let at = pairs.0[odd_pair_of(film, &pairs.0)?].film_px;
+    Some(format!(
+        "; without the one at {}, {} px they agree",
+        at.x, at.y
+    ))
 }
 
 /// Reads the points of a file.

@@ -7,12 +7,32 @@ use super::raw_tree::{RawNode, RawTree};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 
-/// Length of a step D in the distance of points; the distance d_k in which a point is reached, and
-/// d_i in which it draws, in steps. The papers give no numbers for clouds. From 12 steps lines cut corners, and
-/// points that are reached from 2 are those of short branches (made clouds 68811 to 68814).
-const STEP_CELLS: f64 = 2.0;
-const KILL_STEPS: f64 = 1.0;
-const INFLUENCE_STEPS: f64 = 2.0;
+/// The lengths of the growth. The papers give no numbers for clouds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Colonisation {
+    /// Length of a step D, in distances of points.
+    pub step_cells: f64,
+    /// Distance d_k in which a point is reached, and d_i in which it draws, in steps.
+    pub kill_steps: f64,
+    pub influence_steps: f64,
+}
+
+impl Colonisation {
+    /// Along the wood. From 12 steps lines cut corners, and points that are reached from 2 are those of short
+    /// branches (made clouds 68811 to 68814).
+    pub const ALONG_WOOD: Self = Self {
+        step_cells: 2.0,
+        kill_steps: 1.0,
+        influence_steps: 2.0,
+    };
+    /// In the bare cloud.
+    pub const BARE: Self = Self {
+        step_cells: 2.0,
+        kill_steps: 2.0,
+        influence_steps: 8.0,
+    };
+}
+
 /// A node that would grow a child this near to one that it has, in steps, is drawn to and fro
 /// between two points, and stops (the guard that Runions' loop needs to end).
 const SAME_CHILD: f64 = 0.1;
@@ -102,7 +122,10 @@ struct Growth<'a> {
     at_middle: Vec<u32>,
     children: Vec<Vec<u32>>,
     drawn: Vec<Drawn>,
+    /// Length of a step, and the distances in which a point is reached and draws.
     step: f64,
+    kill: f32,
+    influence: f32,
 }
 
 /// The tree that is grown from `foot` into the points, which are about `cell` apart and belong to the tree
@@ -113,16 +136,40 @@ pub(super) fn colonise(
     points: &[Point3<f32>],
     foot: Point3<f64>,
     cell: f32,
+    lengths: &Colonisation,
 ) -> RawTree {
     let mut drawing = middles.contracted(points);
     let mut middle_of = middles.of_point.clone();
-    for (middle, at) in middles.between(foot, STEP_CELLS * f64::from(cell)) {
+    for (middle, at) in middles.between(foot, lengths.step_cells * f64::from(cell)) {
         middle_of.push(middle);
         drawing.push(at);
     }
-    let mut tree = grown(&drawing, &middle_of, middles, foot, cell);
+    let mut tree = grown(&drawing, &middle_of, middles, foot, cell, lengths);
     tree.of_point.truncate(points.len());
     tree
+}
+
+/// The loop of Runions 2007 on the points as they are, with no guard but that against the two-point oscillation: all
+/// points belong to one middle, and draw what is nearest.
+pub(super) fn colonise_bare(
+    points: &[Point3<f32>],
+    foot: Point3<f64>,
+    cell: f32,
+    lengths: &Colonisation,
+) -> RawTree {
+    let mut middles = RawTree::default();
+    middles.nodes.push(RawNode {
+        parent: None,
+        at: foot,
+    });
+    grown(
+        points,
+        &vec![0; points.len()],
+        &middles,
+        foot,
+        cell,
+        lengths,
+    )
 }
 
 /// The tree that is grown from `foot` into the points, which are about `cell` apart. A point draws only wood that
@@ -133,14 +180,16 @@ fn grown(
     middles: &RawTree,
     foot: Point3<f64>,
     cell: f32,
+    lengths: &Colonisation,
 ) -> RawTree {
-    let step = STEP_CELLS * f64::from(cell);
+    let step = lengths.step_cells * f64::from(cell);
+    let influence = (lengths.influence_steps * step) as f32;
     let mut growth = Growth {
         points,
         middles,
         carried: Carried::of(middles),
         middle_of,
-        grid: Grid::new(points, (INFLUENCE_STEPS * step) as f32),
+        grid: Grid::new(points, influence),
         tree: RawTree::default(),
         at_middle: Vec::new(),
         children: Vec::new(),
@@ -153,6 +202,8 @@ fn grown(
             points.len()
         ],
         step,
+        kill: (lengths.kill_steps * step) as f32,
+        influence,
     };
     growth.add(None, foot, 0);
     growth.rise();
@@ -171,24 +222,20 @@ impl Growth<'_> {
         if let Some(parent) = parent {
             self.children[parent].push(node);
         }
-        let kill = (KILL_STEPS * self.step) as f32;
+        let (kill, influence) = (self.kill, self.influence);
         let (drawn, carried, middle_of) = (&mut self.drawn, &self.carried, self.middle_of);
-        self.grid.within(
-            &at.cast(),
-            (INFLUENCE_STEPS * self.step) as f32,
-            |point, square| {
-                let of = middle_of[point as usize];
-                if of == u32::MAX || !carried.carries(middle, of) {
-                    return;
-                }
-                let own = &mut drawn[point as usize];
-                let distance = square.sqrt();
-                if distance < own.distance {
-                    (own.node, own.distance) = (node, distance);
-                }
-                own.is_reached |= distance < kill;
-            },
-        );
+        self.grid.within(&at.cast(), influence, |point, square| {
+            let of = middle_of[point as usize];
+            if of == u32::MAX || !carried.carries(middle, of) {
+                return;
+            }
+            let own = &mut drawn[point as usize];
+            let distance = square.sqrt();
+            if distance < own.distance {
+                (own.node, own.distance) = (node, distance);
+            }
+            own.is_reached |= distance < kill;
+        });
     }
 
     /// The stem grows straight up until a point draws it.
@@ -288,15 +335,8 @@ impl Growth<'_> {
 mod tests {
     use super::*;
 
-    /// Points that all belong to one middle.
-    fn grown_freely(points: &[Point3<f32>]) -> RawTree {
-        let mut middles = RawTree::default();
-        middles.nodes.push(RawNode {
-            parent: None,
-            at: Point3::origin(),
-        });
-        let middle_of = vec![0; points.len()];
-        grown(points, &middle_of, &middles, Point3::origin(), 1.0)
+    fn grown_bare(points: &[Point3<f32>]) -> RawTree {
+        colonise_bare(points, Point3::origin(), 1.0, &Colonisation::ALONG_WOOD)
     }
 
     /// A middle at each point.
@@ -316,11 +356,11 @@ mod tests {
     #[test]
     fn growth_ends_and_reaches_what_it_can() {
         let pair = [Point3::new(-3.0, 0.0, 5.0), Point3::new(3.0, 0.0, 5.0)];
-        assert!(grown_freely(&pair).nodes.len() < 200);
+        assert!(grown_bare(&pair).nodes.len() < 200);
         let row: Vec<Point3<f32>> = (0..60)
             .map(|i| Point3::new(0.5 * i as f32, 0.0, 10.0 + i as f32))
             .collect();
-        let tree = grown_freely(&row);
+        let tree = grown_bare(&row);
         let tip = tree.nodes.iter().map(|n| n.at.z).fold(0.0, f64::max);
         assert!((66.0..70.0).contains(&tip), "{tip}");
         assert!(tree.of_point.iter().all(|n| *n != u32::MAX));
@@ -341,7 +381,13 @@ mod tests {
                 if i == 60 { Some(20) } else { i.checked_sub(1) }
             },
         );
-        let tree = colonise(&middles, &points, Point3::origin(), 1.0);
+        let tree = colonise(
+            &middles,
+            &points,
+            Point3::origin(),
+            1.0,
+            &Colonisation::ALONG_WOOD,
+        );
         let mut node = tree.of_point[points.len() - 1] as usize;
         let mut farthest: f64 = 0.0;
         while let Some(parent) = tree.nodes[node].parent {
@@ -368,7 +414,13 @@ mod tests {
                 if i == 60 { Some(19) } else { i.checked_sub(1) }
             },
         );
-        let tree = colonise(&middles, &points, Point3::origin(), 1.0);
+        let tree = colonise(
+            &middles,
+            &points,
+            Point3::origin(),
+            1.0,
+            &Colonisation::ALONG_WOOD,
+        );
         assert!(tree.of_point.iter().all(|node| *node != u32::MAX));
     }
 
@@ -379,7 +431,13 @@ mod tests {
             .map(|i| Point3::new(0.0, 0.0, if i < 40 { i as f32 } else { 60.0 + i as f32 }))
             .collect();
         let middles = middles_at(&row, |i| i.checked_sub(1));
-        let tree = colonise(&middles, &row, Point3::origin(), 1.0);
+        let tree = colonise(
+            &middles,
+            &row,
+            Point3::origin(),
+            1.0,
+            &Colonisation::ALONG_WOOD,
+        );
         let tip = tree.nodes.iter().map(|n| n.at.z).fold(0.0, f64::max);
         assert!((155.0..162.0).contains(&tip), "{tip}");
         assert_eq!(tree.of_point.len(), row.len());

@@ -23,6 +23,9 @@ pub enum CloudError {
          no tree; give a cloud of a tree that stands along z"
     )]
     Low { height_m: f64, width_m: f64 },
-    #[error("the tree would be {height_m:.3} m high; give the unit of the file with --unit")]
+    #[error(
+        "the tree would be {height_m:.3} m high; give the unit of the file with --unit, or another one than that which \
+         is given"
+    )]
     OddSize { height_m: f64 },
 }

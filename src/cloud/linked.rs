@@ -18,13 +18,13 @@ const FINEST_TREES: usize = 20;
 /// Gaps that are then led over, cells: trees that stand apart are not joined, and a wider search about
 /// each of their points would take long.
 const GAP_OF_STAND_CELLS: f32 = 8.0;
-/// Gaps are led over up to this share of the tree's height.
 /// The distance of points about a place is the median of those that are so many cells away, and no more than so many
 /// cells: a trunk may be sparser than twigs, and a gap is none of its points.
 const ABOUT_CELLS: f32 = 5.0;
 const SPARSEST_CELLS: f32 = 2.0;
 /// The distance of a point is that to this one of its neighbours.
 const NEIGHBOUR: usize = 3;
+/// Gaps are led over up to this share of the tree's height.
 const GAP_SHARE: f32 = 0.1;
 /// A tree whose lowest wood is farther above the ground than this share of its height has no trunk.
 const TRUNKLESS: f32 = 0.25;

@@ -28,13 +28,15 @@ mod refine;
 mod register;
 mod standing;
 mod stems;
+mod steps;
 mod thin;
 mod tree;
 mod verdict;
 
+pub use colonise::Colonisation;
 pub use error::CloudError;
 pub use lines::{LinePlace, Nearest, WoodPiece, places_seen, thickest};
-pub use register::{PlacePair, Registration, by_lines, by_pairs};
+pub use register::{PlacePair, Registration, by_lines, by_pairs, odd_pair};
 pub use tree::{CloudFigures, CloudNode, CloudTree};
 pub use verdict::verdict;
 
@@ -65,13 +67,15 @@ const HEIGHTS_M: std::ops::RangeInclusive<f64> = 0.05..=200.0;
 const LEAST_HEIGHT: f64 = 0.2;
 
 /// How the middle lines are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum CloudMethod {
     /// Along the shortest ways from the foot.
     #[default]
     Paths,
-    /// Space colonisation (Runions et al. 2007).
-    Colonisation,
+    /// Space colonisation along the wood.
+    Colonisation(Colonisation),
+    /// Space colonisation of the bare points (Runions et al. 2007).
+    Runions(Colonisation),
 }
 
 /// What may be chosen.
@@ -87,7 +91,7 @@ pub struct CloudOptions {
 /// The trees in a cloud.
 #[derive(Clone, Debug)]
 pub struct CloudTrees {
-    /// The one with most points first; why there is none where it could not be made.
+    /// The largest first, by points of one distance; why there is none where it could not be made.
     pub trees: Vec<Result<CloudTree, CloudError>>,
     /// Of each point of the cloud its place in `trees`; `None` for ground, noise and undergrowth.
     pub tree_of_point: Vec<Option<u32>>,
@@ -105,7 +109,7 @@ impl CloudTrees {
     }
 }
 
-/// The tree in a cloud; of several the one with most points.
+/// The tree in a cloud; of several the largest.
 ///
 /// # Errors
 /// There are too few points, they stand for no tree, or the trunk is missing.
@@ -121,6 +125,7 @@ pub fn tree_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudT
 pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<CloudTrees, CloudError> {
     let mut figures = CloudFigures {
         points: cloud.points.len(),
+        step_m: steps::coarsest(&cloud.points).into(),
         ..CloudFigures::default()
     };
     let standing = Standing::of(&cloud.points, &mut figures)?;
@@ -152,19 +157,23 @@ pub fn trees_of_cloud(cloud: &PointCloud, options: CloudOptions) -> Result<Cloud
     }
     drop(fine);
     for own in standing.split(&found.tree_of_point, stand.trees) {
-        found
-            .trees
-            .push(own.and_then(|own| tree_of_part(&own, options)));
+        let tree = own.and_then(|own| tree_of_part(&own, figures.step_m, options));
+        found.trees.push(tree);
     }
     let mut made: Vec<&mut CloudTree> = found.trees.iter_mut().flatten().collect();
     boughs::look_for_forks(&mut made);
     Ok(found)
 }
 
-/// The tree of the points that are of one tree.
-fn tree_of_part(standing: &Standing, options: CloudOptions) -> Result<CloudTree, CloudError> {
+/// The tree of the points that are of one tree, of a cloud whose coordinates have steps of `step_m`.
+fn tree_of_part(
+    standing: &Standing,
+    step_m: f64,
+    options: CloudOptions,
+) -> Result<CloudTree, CloudError> {
     let mut figures = CloudFigures {
         points: standing.points.len(),
+        step_m,
         ..CloudFigures::default()
     };
     let linked = Linked::of_tree(standing, &mut figures)?;
@@ -179,6 +188,7 @@ fn tree_of(
     mut figures: CloudFigures,
 ) -> Result<CloudTree, CloudError> {
     figures.in_leaf = options.in_leaf;
+    figures.is_grown_bare = matches!(options.method, CloudMethod::Runions(_));
     figures.has_ground = standing.ground.is_some();
     if options.in_leaf {
         linked = linked.without_leaves(standing, &mut figures)?;
@@ -205,7 +215,10 @@ fn tree_of(
     let by_levels = levels::level_tree(points, &graph, &ways, STRETCH_CELLS * cell);
     let raw = match options.method {
         CloudMethod::Paths => by_levels,
-        CloudMethod::Colonisation => colonise::colonise(&by_levels, points, base, cell),
+        CloudMethod::Colonisation(lengths) => {
+            colonise::colonise(&by_levels, points, base, cell, &lengths)
+        }
+        CloudMethod::Runions(lengths) => colonise::colonise_bare(points, base, cell, &lengths),
     };
     let mut paths = raw.paths();
     let detail = radius::Detail::new(&standing.points, &thinned.of_point, points.len());

@@ -39,6 +39,8 @@ const OTHER_SIDE_RAD: f64 = 0.4;
 const LEAST_CONTRAST: f64 = 1.15;
 /// Pairs of places are missed by no more than this share of the height.
 const LARGEST_PAIR_MISS: f64 = 0.03;
+/// They agree if they are missed by no more than this share: places are clicked to 0.5 %.
+const AGREEING: f64 = 0.01;
 
 /// The same place in the film and in the scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,6 +158,27 @@ pub fn by_pairs(pairs: &[PlacePair], height_px: f64) -> Option<Registration> {
         }
     }
     best
+}
+
+/// The pair without which the others agree, of five or more that do not: all are off by more than
+/// [`AGREEING`] of the height, and these by less.
+pub fn odd_pair(pairs: &[PlacePair], height_px: f64) -> Option<usize> {
+    let is_off = by_pairs(pairs, height_px).is_none_or(|all| all.miss > AGREEING);
+    if pairs.len() < 5 || !is_off {
+        return None;
+    }
+    let mut odd = None;
+    for k in 0..pairs.len() {
+        let mut others = pairs.to_vec();
+        others.remove(k);
+        if by_pairs(&others, height_px).is_some_and(|fit| fit.miss <= AGREEING) {
+            if odd.is_some() {
+                return None;
+            }
+            odd = Some(k);
+        }
+    }
+    odd
 }
 
 /// The similarity of least squares; `None` where all lie in one place.

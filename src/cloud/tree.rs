@@ -46,6 +46,10 @@ pub struct CloudFigures {
     /// Whether leaves were to be taken off, and their points.
     pub in_leaf: bool,
     pub leaves: usize,
+    /// Whether its lines grew in the bare points, as Runions et al. 2007 have it.
+    pub is_grown_bare: bool,
+    /// Steps of the coordinates of the cloud; 0 where they have none that show, m.
+    pub step_m: f64,
     /// Side of the cells in which points are one, m.
     pub cell_m: f64,
     /// Standard deviation of points off thick wood, m; 0 where there is none.

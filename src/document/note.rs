@@ -120,7 +120,7 @@ pub struct DepthNote {
 }
 
 /// What a point cloud showed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanNote {
     /// The tree's foot in the axes of the cloud, z up, m.
     pub foot_m: [f64; 3],
@@ -161,8 +161,16 @@ pub struct ScanNote {
     pub film: Option<ScanFilmNote>,
 }
 
+/// A piece of a filmed branch with a frequency, and the branches of the scan that it lies on, by their names.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LaidBranch {
+    pub film: String,
+    /// None where no wood of the scan lies there.
+    pub scan: Vec<String>,
+}
+
 /// How a film lies on a point cloud.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanFilmNote {
     /// From the cloud's x axis to the right of the picture, about its z axis.
     pub turn_deg: f64,
@@ -187,6 +195,9 @@ pub struct ScanFilmNote {
     pub other_side_miss: Option<f64>,
     /// Pieces of branches that carry a filmed frequency.
     pub branches: u64,
+    /// Where each filmed branch with a frequency went.
+    #[serde(default)]
+    pub laid: Vec<LaidBranch>,
 }
 
 /// Where the frames came from.

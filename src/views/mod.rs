@@ -41,11 +41,11 @@ pub use photo::{
 #[cfg(feature = "opencv")]
 pub use photo_forest::{StandingPlaces, photo_forest};
 pub use prepared::{PreparedTree, TreeOptions};
-pub use scan_film::register_film;
+pub use scan_film::{odd_pair_of, register_film};
 pub use scan_forest::{StandingTree, scan_forest};
 pub use scanned::{FilmOnScan, scan_defaults};
 pub use studio::{FilmPlace, Shot, Studio, VIDEO_S};
-pub use sway_on_scan::{FilmedPoint, filmed_points, sway_on_scan};
+pub use sway_on_scan::{FilmedPoint, ScanSway, filmed_points, sway_on_scan};
 pub use tables::TablesWritten;
 pub use write::{
     DocumentWriter, Draft, ReadyDocument, SwayFound, put_notes, update, write_document,

@@ -2,7 +2,7 @@
 
 use super::film_fit::{FilmFit, Grounds, Upright};
 use super::film_lines::FilmPiece;
-use crate::cloud::{CloudTree, PlacePair, WoodPiece, by_lines, by_pairs};
+use crate::cloud::{CloudTree, PlacePair, WoodPiece, by_lines, by_pairs, odd_pair};
 use crate::document::Document;
 use crate::model::{Excitation, NodeId, Skeleton};
 use nalgebra::{Point2, Point3};
@@ -22,13 +22,8 @@ pub fn register_film(
         let found = by_lines(&wood, &scan)?;
         return FilmFit::by_lines(found, &pieces, &scan, upright);
     };
-    let height_px = wood.iter().map(|p| p.to.y).fold(0.0, f64::max);
-    let foot_px = film.skeleton.foot_px;
-    let with_v_up = |p: &PlacePair| PlacePair {
-        film_px: Point2::new(p.film_px.x - foot_px.x, foot_px.y - p.film_px.y),
-        scan: p.scan,
-    };
-    let pairs: Vec<PlacePair> = pairs.iter().map(with_v_up).collect();
+    let height_px = height_px(&film.skeleton);
+    let pairs = from_foot(pairs, &film.skeleton);
     let found = by_pairs(&pairs, height_px)?;
     // Three pairs are six numbers for five unknowns; lines say more, and how sure it is. Where the pairs
     // are from a tree in wind they may lead to another side of it.
@@ -45,6 +40,32 @@ pub fn register_film(
         return Some(FilmFit { grounds, ..fit });
     }
     FilmFit::by_pairs(found, &pairs, &pieces, &scan, upright.is_some())
+}
+
+/// Which of the pairs does not fit the others, where one alone does not.
+pub fn odd_pair_of(film: &Document, pairs: &[PlacePair]) -> Option<usize> {
+    let pairs = from_foot(pairs, &film.skeleton);
+    odd_pair(&pairs, height_px(&film.skeleton))
+}
+
+/// Height of what was filmed, px.
+fn height_px(film: &Skeleton) -> f64 {
+    let measured = &film.nodes[..film.measured()];
+    measured.iter().map(|n| n.position.y).fold(0.0, f64::max)
+}
+
+/// The pairs with the places in the film against its foot, y up.
+fn from_foot(pairs: &[PlacePair], film: &Skeleton) -> Vec<PlacePair> {
+    let foot_px = film.foot_px;
+    let mut out = Vec::with_capacity(pairs.len());
+    for pair in pairs {
+        let [right, down] = [pair.film_px.x - foot_px.x, pair.film_px.y - foot_px.y];
+        out.push(PlacePair {
+            film_px: Point2::new(right, -down),
+            scan: pair.scan,
+        });
+    }
+    out
 }
 
 /// What is known of the upright in a film in wind; `None` for a film of a release, in which the tree

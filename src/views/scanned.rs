@@ -5,7 +5,7 @@ use super::drawn::{DrawnTree, note};
 use super::film_fit::{FilmFit, Grounds};
 use crate::cloud::{CloudTree, verdict};
 use crate::config::{Config, LeafShow};
-use crate::document::note::{ScanFilmNote, ScanNote};
+use crate::document::note::{LaidBranch, ScanFilmNote, ScanNote};
 use crate::model::{Finding, Grade, Outline, PointCloud, Swaying};
 use crate::pipeline::ScaledTree;
 use nalgebra::Vector3;
@@ -24,6 +24,8 @@ pub struct FilmOnScan {
     pub fit: FilmFit,
     /// By node index of the scanned tree.
     pub sway: Vec<Swaying>,
+    /// Where each filmed branch with a frequency went.
+    pub laid: Vec<LaidBranch>,
     /// A tag was seen in the film.
     pub has_tag: bool,
     /// As the film knows it; 0 where it does not.
@@ -120,7 +122,30 @@ impl FilmOnScan {
             miss: registration.miss,
             other_side_miss: registration.other_side_miss,
             branches: self.branches() as u64,
+            laid: self.laid.clone(),
         }
+    }
+
+    /// Where each filmed branch with a frequency went, a line for those that are on the scan and one for the others.
+    pub fn whereabouts(&self) -> Vec<String> {
+        let (on, off): (Vec<&LaidBranch>, Vec<&LaidBranch>) =
+            self.laid.iter().partition(|laid| !laid.scan.is_empty());
+        let mut lines = Vec::new();
+        if !on.is_empty() {
+            let each = on
+                .iter()
+                .map(|laid| format!("{} on {}", laid.film, laid.scan.join(", ")));
+            let each: Vec<String> = each.collect();
+            lines.push(format!("from the film to the scan: {}", each.join("; ")));
+        }
+        if !off.is_empty() {
+            let names: Vec<&str> = off.iter().map(|laid| laid.film.as_str()).collect();
+            lines.push(format!(
+                "branches of the film with a frequency that lie on no branch of the scan: {}",
+                names.join(", ")
+            ));
+        }
+        lines
     }
 }
 
@@ -222,6 +247,7 @@ mod tests {
                 lean: None,
             },
             sway: Vec::new(),
+            laid: Vec::new(),
             has_tag: false,
             film_metres_per_px,
         };

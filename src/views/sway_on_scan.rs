@@ -5,11 +5,12 @@
 
 use crate::bounds::Bounds;
 use crate::cloud::{LinePlace, Registration, WoodPiece};
+use crate::document::note::LaidBranch;
 use crate::document::{Document, DocumentError};
 use crate::model::{BotanicalBranches, NodeId, Skeleton, Swaying, Unidentified};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A point is on no wood whose bark is farther off in the picture than this share of the tree's
 /// height: a registration is not off by more.
@@ -51,7 +52,17 @@ pub fn filmed_points(film: &Document) -> Result<Vec<FilmedPoint>, DocumentError>
     Ok(points)
 }
 
-/// The sway of a film on the branches of a scanned tree, by node index. `points` are those of the film.
+/// The sway of a film on the branches of a scanned tree.
+#[derive(Clone, Debug)]
+pub struct ScanSway {
+    /// By node index of the scan.
+    pub sway: Vec<Swaying>,
+    /// Pieces of filmed branches with a frequency, and the scanned branches that have it: none where no wood of the
+    /// scan lies there.
+    pub laid: Vec<LaidBranch>,
+}
+
+/// Puts the sway of a film on a scanned tree. `points` are those of the film.
 /// Each filmed branch is given to the pieces of its scanned branch that lie on it. What nothing was
 /// filmed on is not measured.
 pub fn sway_on_scan(
@@ -60,7 +71,7 @@ pub fn sway_on_scan(
     film: &Document,
     points: &[FilmedPoint],
     registration: &Registration,
-) -> Vec<Swaying> {
+) -> ScanSway {
     let seen = SeenScan {
         registration,
         metres_per_px,
@@ -93,6 +104,12 @@ pub fn sway_on_scan(
         }
     }
     let mut sway = vec![Err(Unidentified::NotMeasured); scan.nodes.len()];
+    let mut laid = BTreeMap::<NodeId, BTreeSet<String>>::new();
+    for node in film.skeleton.measured_branches() {
+        if film.sway.get(node.index()).is_some_and(Result::is_ok) {
+            laid.insert(node, BTreeSet::new());
+        }
+    }
     for piece in scan.measured_branches() {
         let own = line(scan, piece, |at| seen.project(at));
         // Most points of all may be on a bough in which the filmed trunk goes on.
@@ -106,12 +123,22 @@ pub fn sway_on_scan(
             .map(|f| (f.node, mean_off(&own, &f.line, ACROSS_SHARE * height_px)));
         let nearest = offs.min_by(|a, b| a.1.total_cmp(&b.1));
         let lies = nearest.filter(|(_, off)| *off <= FARTHEST_SHARE * height_px);
-        let filmed = lies.and_then(|(node, _)| film.sway.get(node.index()));
-        if let Some(own) = filmed.filter(|s| s.is_ok()) {
-            sway[piece.index()] = *own;
+        if let Some((node, _)) = lies
+            && let Some(on) = laid.get_mut(&node)
+        {
+            sway[piece.index()] = film.sway[node.index()];
+            on.insert(names.name(piece));
         }
     }
-    sway
+    let film_names = film.skeleton.botanical_branches().piece_names();
+    let named = |(node, scan): (NodeId, BTreeSet<String>)| LaidBranch {
+        film: film_names[node.index()].clone(),
+        scan: scan.into_iter().collect(),
+    };
+    ScanSway {
+        sway,
+        laid: laid.into_iter().map(named).collect(),
+    }
 }
 
 /// Whether the branch that ends in a node begins at the foot.

@@ -65,6 +65,7 @@ impl PreparedTree {
             .document
             .note
             .scan
+            .as_ref()
             .filter(|_| self.config.export.metres_per_px > 0.0);
         Qsm::new(
             &cylinders_by_branch(&self.dressed.limbs, &self.skeleton),

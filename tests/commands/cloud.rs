@@ -157,6 +157,11 @@ fn a_cloud_becomes_a_document_with_the_trees_own_wood() {
         top * tree.note.config.export.metres_per_px
     };
     assert!((height(&grown) - height(&out)).abs() < 0.1);
+    // As the paper has it, which is honest about what it is worth.
+    let bare = dir.path().join("bare");
+    let said = done(&["cloud", name, "--method", "runions"], &bare);
+    assert!((height(&bare) - height(&out)).abs() < 0.1);
+    assert!(said.contains("strands all around thick wood"), "{said}");
     let shown = out.to_str().expect("name");
     for (arguments, file) in [
         (vec!["render", shown], "tree.png"),

@@ -9,9 +9,20 @@ use std::path::Path;
 const PAIR_COLUMNS: &str = "u_px,v_px,x,y,z";
 const LARGEST_PAIRS: u64 = 1_000_000;
 
+/// What may part cells; where it is no comma, numbers may have one.
+const SEPARATORS: [char; 3] = [',', ';', '\t'];
+
 /// The places of `--pairs`, in the unit of the scan.
 #[derive(Clone, Debug)]
 pub struct Pairs(pub Vec<PlacePair>);
+
+/// The number in a cell.
+fn number(cell: &str, separator: char) -> Option<f64> {
+    match separator {
+        ',' => cell.parse().ok(),
+        _ => cell.replace(',', ".").parse().ok(),
+    }
+}
 
 /// Parses `--pairs`.
 pub fn read_pairs(path: &str) -> Result<Pairs, String> {
@@ -21,17 +32,18 @@ pub fn read_pairs(path: &str) -> Result<Pairs, String> {
     let mut lines = (1..)
         .zip(without_byte_order_mark(&text).lines().map(str::trim))
         .filter(|(_, line)| !line.is_empty());
-    if lines
-        .next()
-        .is_none_or(|(_, line)| line.replace(' ', "") != PAIR_COLUMNS)
-    {
+    let head = lines.next().map_or("", |(_, line)| line).replace(' ', "");
+    let separator = SEPARATORS
+        .into_iter()
+        .find(|separator| head.replace(*separator, ",") == PAIR_COLUMNS);
+    let Some(separator) = separator else {
         return Err(format!("its first line must be {PAIR_COLUMNS}"));
-    }
+    };
     let mut pairs = Vec::new();
-    for (number, line) in lines {
+    for (row, line) in lines {
         let cells: Option<Vec<f64>> = line
-            .split(',')
-            .map(|cell| cell.trim().parse().ok())
+            .split(separator)
+            .map(|cell| number(cell.trim(), separator))
             .collect();
         match cells.as_deref() {
             Some(&[u, v, x, y, z]) if [u, v, x, y, z].iter().all(|n| n.is_finite()) => {
@@ -40,7 +52,7 @@ pub fn read_pairs(path: &str) -> Result<Pairs, String> {
                     scan: Point3::new(x, y, z),
                 })
             }
-            _ => return Err(format!("line {number} does not hold five numbers")),
+            _ => return Err(format!("line {row} does not hold five numbers")),
         }
     }
     match pairs.len() {

@@ -27,6 +27,8 @@ struct Field {
 struct Header {
     fields: Vec<Field>,
     points: u64,
+    width: Option<u64>,
+    height: Option<u64>,
     data: String,
 }
 
@@ -125,12 +127,25 @@ impl Header {
                 ImportError::bad_format(format!("its header cannot be read at {key}"))
             })?;
             if !header.data.is_empty() {
-                return Ok(header);
+                return header.checked();
             }
         }
         Err(ImportError::bad_format(
             "its header has no end, and it is no PCD",
         ))
+    }
+
+    /// Checks that it says one number of points.
+    fn checked(self) -> Result<Self, ImportError> {
+        match (self.width, self.height) {
+            (Some(width), Some(height)) if width.checked_mul(height) != Some(self.points) => {
+                Err(ImportError::bad_format(format!(
+                    "its header says POINTS {}, and WIDTH {width} times HEIGHT {height}: set them right",
+                    self.points
+                )))
+            }
+            _ => Ok(self),
+        }
     }
 
     /// Takes a line of the header; `None` where it cannot be read.
@@ -160,6 +175,8 @@ impl Header {
                     field.count = value.parse().ok()?;
                 }
             }
+            "WIDTH" => self.width = Some(values.first()?.parse().ok()?),
+            "HEIGHT" => self.height = Some(values.first()?.parse().ok()?),
             "POINTS" => self.points = values.first()?.parse().ok()?,
             "DATA" => self.data = values.first()?.to_ascii_lowercase(),
             _ => {}
