@@ -548,6 +548,14 @@ fn print_too_few_said(said: Option<TooFewSaid>) {
     }
 }
 
+/// How many branches a tree has, in words.
+fn branches_said(branches: usize) -> String {
+    match branches {
+        1 => "1 branch".to_owned(),
+        n => format!("{n} branches"),
+    }
+}
+
 fn print_summary(out: &Path, tree: &CloudTree, branches: usize, verdict: &Verdict) {
     let figures = tree.figures;
     let leaves = match figures.leaves {
@@ -555,9 +563,10 @@ fn print_summary(out: &Path, tree: &CloudTree, branches: usize, verdict: &Verdic
         leaves => format!(", {:.0} % leaves", figures.percent(leaves)),
     };
     eprint_line(&format!(
-        "{}: a tree of {branches} branches, {:.2} m high; of {} points {:.0} % are ground{leaves} \
+        "{}: a tree of {}, {:.2} m high; of {} points {:.0} % are ground{leaves} \
          and {:.1} % noise",
         out.display(),
+        branches_said(branches),
         figures.height_m,
         figures.points,
         figures.percent(figures.ground),

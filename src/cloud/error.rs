@@ -3,7 +3,7 @@
 /// Each message is one line that says what to do. The name of the file is put before it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CloudError {
-    #[error("it holds {points} points, and a tree takes {least} at least; scan it more finely")]
+    #[error("a tree takes {least} points at least, and it holds {points}; scan it more finely")]
     TooFew { points: usize, least: usize },
     #[error("its points lie in one plane or line; give a cloud of a tree that stands along z")]
     Flat,

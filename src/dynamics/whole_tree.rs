@@ -6,7 +6,7 @@ use super::film::Film;
 use super::members::{is_seen, mean_px, share_among};
 use super::point_modes::{PointMode, PointModes};
 use super::wind;
-use crate::model::{Excitation, NodeId, Sway, Swaying, TreeMode, Unidentified};
+use crate::model::{Excitation, Interval, NodeId, Sway, Swaying, TreeMode, Unidentified};
 use nalgebra::Point2;
 
 /// A mode with this share of its points in one that is known, and its frequency, is that one.
@@ -14,6 +14,8 @@ const SHARE_IN_KNOWN: f64 = 0.6;
 /// r(1 - cos Θ) of a swing sin ωt: its part at 2ω, for small angles, is this share of rΘ for each
 /// radian.
 const SECOND_ORDER: f64 = 0.25;
+/// Two frequencies are alike within their intervals, and within this share.
+const ALIKE: f64 = 0.01;
 
 /// A mode that turns some points about a place.
 struct Swing<'a> {
@@ -50,7 +52,8 @@ pub(super) fn modes_of_tree(
 /// - Less than the other modes move these points at second order: a point that swings by an angle Θ
 ///   moves on an arc. Besides what is proportional to Θ it has a displacement of Θ/4 of that, at sums
 ///   and differences of frequencies. What a linear model finds below that is as likely this, or a
-///   neighbour's motion that the tracks have caught, as a mode of the branch.
+///   neighbour's motion that the tracks have caught, as a mode of the branch. So is what has no damping, at twice or
+///   three times the trunk's frequency.
 /// - In wind, less than noise does. After a release a fit in phase finds less than that.
 pub(super) fn withdraw_small(
     tree: &BranchTree,
@@ -67,6 +70,10 @@ pub(super) fn withdraw_small(
         let Some(branch) = swing.branch.filter(|b| *b != trunk.index()) else {
             continue;
         };
+        if sways[trunk.index()].is_ok_and(|trunk| is_overtone(&swing.sway, &trunk)) {
+            withdrawn.push((branch, Unidentified::AncestorsSway));
+            continue;
+        }
         // An angle that is not known says nothing.
         if swing.angle() == 0.0 {
             continue;
@@ -91,6 +98,20 @@ pub(super) fn withdraw_small(
     for (branch, reason) in withdrawn {
         sways[branch] = Err(reason);
     }
+}
+
+/// Whether what oscillates may be of the second or third order: at twice or three times the frequency of the trunk, and
+/// decaying as no mode does that a damping could be found of.
+fn is_overtone(own: &Sway, trunk: &Sway) -> bool {
+    if own.damping_ratio.is_some() {
+        return false;
+    }
+    let Interval { value, lo, hi } = own.frequency_hz;
+    let [low, high] = [lo.min((1.0 - ALIKE) * value), hi.max((1.0 + ALIKE) * value)];
+    let times = |n: f64| n * trunk.frequency_hz.value;
+    [2.0, 3.0]
+        .into_iter()
+        .any(|n| (low..=high).contains(&times(n)))
 }
 
 /// The answers of `sways`, and the modes of `found` that are none of these.
@@ -176,7 +197,7 @@ impl Swing<'_> {
 mod tests {
     use super::super::film::FilmTrack;
     use super::*;
-    use crate::model::{Interval, Node, Size, Skeleton};
+    use crate::model::{Node, Size, Skeleton};
 
     fn sway(frequency_hz: f64, amplitude_deg: f64, excitation: Excitation) -> Swaying {
         Ok(Sway {
@@ -194,6 +215,11 @@ mod tests {
     /// What is left of the limb's answer: a trunk of 100 px that swings by `trunk_deg`, and a limb of
     /// 50 px on it with five points that swings by `limb_deg`.
     fn limb_after(trunk_deg: f64, limb_deg: f64, excitation: Excitation) -> Swaying {
+        limb_at(1.3, trunk_deg, limb_deg, excitation)
+    }
+
+    /// The same for a limb of this frequency.
+    fn limb_at(limb_hz: f64, trunk_deg: f64, limb_deg: f64, excitation: Excitation) -> Swaying {
         let skeleton = Skeleton {
             nodes: vec![
                 Node::made_up(0, None, [0.0, 0.0, 0.0]),
@@ -215,7 +241,7 @@ mod tests {
         let mut sways = vec![
             Err(Unidentified::NotMeasured),
             sway(0.5, trunk_deg, excitation),
-            sway(1.3, limb_deg, excitation),
+            sway(limb_hz, limb_deg, excitation),
         ];
         let tree = BranchTree::of(&skeleton);
         withdraw_small(&tree, &film, &members, NodeId(1), &mut sways, None);
@@ -231,6 +257,17 @@ mod tests {
         assert_eq!(limb_after(16.0, 2.5, release), by_arc);
         assert!(limb_after(16.0, 6.0, release).is_ok());
         assert!(limb_after(1.0, 2.5, release).is_ok());
+    }
+
+    #[test]
+    fn an_overtone_of_the_trunk_is_no_mode() {
+        let release = Excitation::Release;
+        let by_arc = Err(Unidentified::AncestorsSway);
+        // The trunk sways at 0.5 Hz.
+        assert_eq!(limb_at(1.003, 16.0, 12.0, release), by_arc);
+        assert_eq!(limb_at(1.495, 16.0, f64::NAN, release), by_arc);
+        assert!(limb_at(1.3, 16.0, f64::NAN, release).is_ok());
+        assert!(limb_at(1.2, 16.0, 12.0, release).is_ok());
     }
 
     #[test]

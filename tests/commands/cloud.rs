@@ -923,7 +923,7 @@ fn bad_clouds_get_one_line_and_leave_nothing() {
         ("ground.xyz", FAILED, "as ground does"),
         ("comma.xyz", FAILED, "line 1 has semicolons and commas"),
         ("huge.xyz", FAILED, "--unit"),
-        ("one.xyz", FAILED, "it holds 1 points"),
+        ("one.xyz", FAILED, "points at least, and it holds 1;"),
         ("nan.xyz", FAILED, "no coordinate in it is a number"),
         ("words.txt", FAILED, "line 17"),
         ("empty.las", FAILED, "cut off"),

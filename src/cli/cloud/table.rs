@@ -1,6 +1,6 @@
 //! A table of cylinders or a treefile in place of points: the tree is there already.
 
-use super::{CloudArgs, Scan, Unit};
+use super::{CloudArgs, Scan, Unit, branches_said};
 use crate::cli::command_error::CommandError;
 use crate::cli::example::{read_file, say_what_is_lost, unfit};
 use crate::cli::output::eprint_line;
@@ -95,8 +95,9 @@ pub fn write(
     }
     scan.say_unit("the tree", tree.figures.height_m);
     eprint_line(&format!(
-        "{}: a tree of {branches} branches, {:.2} m high",
+        "{}: a tree of {}, {:.2} m high",
         args.out.display(),
+        branches_said(branches),
         tree.figures.height_m
     ));
     Ok(())
