@@ -6,7 +6,7 @@ mod lag;
 mod register;
 
 pub use gate::DepthGate;
-pub use lag::{DepthLag, LagMeter};
+pub use lag::{DepthLag, LONGEST_LAG_S, LagMeter};
 pub use register::Registration;
 
 use crate::config;
@@ -234,7 +234,7 @@ mod tests {
                 counts[v * 40 + 19] = 0;
             }
         }
-        DepthImage { size: SIZE, counts }
+        DepthImage::new(SIZE, counts)
     }
 
     #[test]

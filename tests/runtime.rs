@@ -558,8 +558,6 @@ fn strokes_are_used_shown_kept_and_finished_with() {
     assert_eq!(tracks(&out).first().map(|t| t.1), Some(0));
 }
 
-/// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the
-/// tree is followed, in the region and off the sky between its branches.
 /// Where two red discs are in a film of 3 s, px.
 fn discs_px(n: u64) -> [Point2<f64>; 2] {
     let swing = 6.0 * (0.2 * n as f64).sin();
@@ -624,6 +622,8 @@ fn markers_that_are_picked_and_hung_on_each_other_are_in_the_capture() {
     assert!(followed >= 110, "{followed}");
 }
 
+/// The strokes of `tests/matting` lie on a part of the first frame; from the first frame on the
+/// tree is followed, in the region and off the sky between its branches.
 #[test]
 fn scribbles_are_solved_on_the_first_picture() {
     let strokes = image::open("tests/matting/scribbles.png")

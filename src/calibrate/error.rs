@@ -5,7 +5,8 @@
 pub enum CalibrateError {
     #[error(
         "the board is seen in {found} pictures, and {views} of these views differ, where {least} are needed; \
-         check --squares (squares along the sides, one more than inner corners), and show the whole board at other places and slants"
+         check --squares (squares along the sides, one more than inner corners), and show the whole board at other \
+         places and slants"
     )]
     TooFewViews {
         views: usize,

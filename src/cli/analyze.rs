@@ -19,6 +19,7 @@ use crate::model::{Excitation, FilmCut, Lens, NodeName, Pose, Skeleton, Swaying,
 use crate::report::{
     Comparison, Given, Study, angles_csv, compare, csv, hints, json, page, spectra_csv, text,
 };
+use crate::runtime::scales_differ;
 use crate::tui::columns;
 use crate::views::{SwayFound, update};
 use anyhow::anyhow;
@@ -40,8 +41,6 @@ const LEAST_CUT_S: f64 = 1.0;
 const SELDOM_SEEN: f64 = 0.5;
 /// And one that moves by less than this share of what markers do.
 const STANDS_STILL: f64 = 0.02;
-/// Two scales that are farther from each other than this share are not of one film.
-const ONE_SCALE: f64 = 0.1;
 /// A frame is read within this share of the time to the next: times of frames jitter.
 const LONGEST_READOUT: f64 = 1.1;
 
@@ -135,8 +134,11 @@ fn read_documents(args: &AnalyzeArgs) -> Result<Vec<Document>, CommandError> {
         };
         let size = document.skeleton.image_size;
         args.scale.check_size(size)?;
-        if let Some(file) = args.marker_file() {
-            file.check_size(size)?;
+        if args.marker_file().is_some_and(|file| file.size() != size) {
+            unused::note(
+                "the picture's size in the file of --markers, which is not that of the film,",
+                "the file says which markers count and their parents; see that it is of this film",
+            );
         }
         documents.push(document);
     }
@@ -462,7 +464,7 @@ fn other_scale(args: &AnalyzeArgs, document: &Document) -> Option<String> {
     let mut config = Config::default();
     args.scale.set(&mut config);
     let given = config.export.metres_per_px;
-    let is_other = own > 0.0 && given > 0.0 && (given / own).ln().abs() > ONE_SCALE;
+    let is_other = own > 0.0 && given > 0.0 && scales_differ(given, own);
     is_other.then(|| {
         format!(
             "a pixel is {given:.5} m long by the given scale, and {own:.5} m by the capture; the given one counts: see \

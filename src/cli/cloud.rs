@@ -94,32 +94,45 @@ enum Method {
 
 impl Method {
     /// The method with its lengths by the settings.
-    fn with(self, settings: &config::Cloud) -> CloudMethod {
-        match self {
+    ///
+    /// # Errors
+    /// Points would draw from no farther than they are reached.
+    fn with(self, settings: &config::Cloud) -> Result<CloudMethod, CommandError> {
+        Ok(match self {
             Self::Paths => CloudMethod::Paths,
             Self::Colonisation => {
-                CloudMethod::Colonisation(lengths(settings, Colonisation::ALONG_WOOD))
+                CloudMethod::Colonisation(lengths(settings, Colonisation::ALONG_WOOD)?)
             }
-            Self::Runions => CloudMethod::Runions(lengths(settings, Colonisation::BARE)),
-        }
+            Self::Runions => CloudMethod::Runions(lengths(settings, Colonisation::BARE)?),
+        })
     }
 }
 
-/// The lengths of space colonisation by the settings; 0 there is that of the method. What draws is farther than what is
+/// The lengths of space colonisation by the settings; 0 there is that of the method, or farther than points are
 /// reached.
-fn lengths(settings: &config::Cloud, usual: Colonisation) -> Colonisation {
-    let [kill_steps, influence_steps] = [settings.kill_steps, settings.influence_steps];
-    let is_given = |steps: &f64| *steps > 0.0;
-    let kill_steps = Some(kill_steps)
-        .filter(is_given)
-        .unwrap_or(usual.kill_steps);
+///
+/// # Errors
+/// Points would draw from no farther than they are reached.
+fn lengths(settings: &config::Cloud, usual: Colonisation) -> Result<Colonisation, CommandError> {
+    let kill_steps = given(settings.kill_steps).unwrap_or(usual.kill_steps);
     let farther = usual.influence_steps.max(2.0 * kill_steps);
-    let influence_steps = Some(influence_steps).filter(is_given).unwrap_or(farther);
-    Colonisation {
+    let influence_steps = given(settings.influence_steps).unwrap_or(farther);
+    if influence_steps <= kill_steps {
+        return Err(CommandError::BadUsage(anyhow!(
+            "cloud.influence_steps is {influence_steps}, and points are reached from cloud.kill_steps, {kill_steps}: \
+             give more"
+        )));
+    }
+    Ok(Colonisation {
         step_cells: settings.step_cells,
         kill_steps,
         influence_steps,
-    }
+    })
+}
+
+/// A setting that is 0 where it is not given.
+fn given(setting: f64) -> Option<f64> {
+    (setting > 0.0).then_some(setting)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -181,7 +194,7 @@ pub fn run(args: &CloudArgs) -> Result<(), CommandError> {
         );
     }
     let options = CloudOptions {
-        method: method.with(&config.cloud),
+        method: method.with(&config.cloud)?,
         twig_radius_m: args.twig_radius_mm.map(|mm| 1e-3 * mm),
         in_leaf: args.in_leaf,
     };

@@ -4,6 +4,7 @@ use super::command_error::CommandError;
 use super::common::parse_within;
 use super::unused;
 use crate::config;
+use crate::depth::LONGEST_LAG_S;
 use crate::files::{LARGEST_NOTE, read_bounded};
 use crate::import::read_lens_profile;
 use crate::model::{Distortion, Pinhole, Size};
@@ -15,8 +16,6 @@ use std::path::Path;
 /// Smallest and largest plausible count of a depth image, m.
 const LEAST_UNIT_M: f64 = 1e-6;
 const LARGEST_UNIT_M: f64 = 1.0;
-/// Depth images are late or early by this at most, s.
-const LONGEST_LATE_S: f64 = 0.25;
 
 /// Depth options of every command that films or reads a film.
 #[derive(Clone, Debug, Default, Args)]
@@ -51,7 +50,7 @@ fn unit(text: &str) -> Result<f64, String> {
 fn late(text: &str) -> Result<f64, String> {
     parse_within(
         text.trim().trim_end_matches('s'),
-        -LONGEST_LATE_S..=LONGEST_LATE_S,
+        -LONGEST_LAG_S..=LONGEST_LAG_S,
         "give seconds, -0.25 to 0.25, like 0.05",
     )
 }

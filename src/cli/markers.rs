@@ -129,12 +129,17 @@ impl MarkerFile {
         Ok(file)
     }
 
+    /// Size of the picture that the windows were drawn in.
+    pub fn size(&self) -> Size {
+        Size::new(self.width, self.height)
+    }
+
     /// Checks that the windows were drawn in a picture of this size.
     ///
     /// # Errors
     /// They were drawn in one of another size.
-    pub fn check_size(&self, size: Size) -> Result<(), CommandError> {
-        let own = Size::new(self.width, self.height);
+    fn check_size(&self, size: Size) -> Result<(), CommandError> {
+        let own = self.size();
         if own == size {
             return Ok(());
         }

@@ -160,8 +160,8 @@ pub fn by_pairs(pairs: &[PlacePair], height_px: f64) -> Option<Registration> {
     best
 }
 
-/// The pair without which the others agree, of five or more that do not: all are off by more than
-/// [`AGREEING`] of the height, and these by less.
+/// The one pair without which the others agree, of five or more that do not; `None` where there is none, or another one
+/// as well. They agree where they are missed by [`AGREEING`] of the height at most.
 pub fn odd_pair(pairs: &[PlacePair], height_px: f64) -> Option<usize> {
     let is_off = by_pairs(pairs, height_px).is_none_or(|all| all.miss > AGREEING);
     if pairs.len() < 5 || !is_off {
@@ -411,6 +411,32 @@ mod tests {
         }
         assert!(by_lines(&other, &scan()).is_none_or(|r| !r.holds()));
         assert!(by_lines(&[], &scan()).is_none());
+    }
+
+    #[test]
+    fn the_pair_that_does_not_fit_the_others_is_named() {
+        let truth = Similarity2::new(Vector2::new(30.0, -40.0), -0.05, 80.0);
+        let places = [
+            [0.0, 0.0, 0.0],
+            [1.0, 0.5, 3.0],
+            [-0.7, 1.0, 4.0],
+            [0.4, -1.5, 3.5],
+            [-1.2, -0.4, 2.2],
+            [0.2, 0.3, 4.8],
+        ];
+        let mut pairs = Vec::new();
+        for at in places.map(Point3::from) {
+            pairs.push(PlacePair {
+                film_px: truth * turned(&at, 1.1),
+                scan: at,
+            });
+        }
+        assert_eq!(odd_pair(&pairs, 400.0), None);
+        pairs[3].film_px.x += 60.0;
+        assert_eq!(odd_pair(&pairs, 400.0), Some(3));
+        // Two that are off are not told from the others.
+        pairs[1].film_px.y -= 80.0;
+        assert_eq!(odd_pair(&pairs, 400.0), None);
     }
 
     #[test]

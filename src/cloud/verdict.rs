@@ -50,9 +50,9 @@ fn in_steps(figures: &CloudFigures) -> Option<Finding> {
             "its coordinates are rounded to {:.1} cm",
             100.0 * figures.step_m
         ),
-        advice:
-            "shift the cloud near to its origin before it is written with numbers of four bytes"
-                .to_owned(),
+        advice: "write the cloud with more decimals, or shift it near to its origin before it is written with numbers \
+                 of four bytes"
+            .to_owned(),
     })
 }
 
@@ -142,8 +142,8 @@ fn off_wood(figures: &CloudFigures) -> Option<Finding> {
     })
 }
 
-/// Whether its lines grew in the points of the bark. Of four made scans (77401 to 77404) the length is off by 160 % with
-/// the usual lengths of the growth; with others it or the branches are.
+/// Whether its lines grew in the points of the bark. Of four made scans (77401 to 77404) the length is off by 160 %
+/// with the usual lengths of the growth; with others it or the branches are.
 fn grown_bare(figures: &CloudFigures) -> Option<Finding> {
     figures.is_grown_bare.then(|| Finding {
         grade: Grade::Fair,

@@ -140,14 +140,6 @@ impl Config {
                 allowed: "an odd number",
             });
         }
-        let cloud = &self.cloud;
-        if cloud.influence_steps > 0.0 && cloud.influence_steps <= cloud.kill_steps {
-            return Err(ConfigError::OutOfRange {
-                key: "cloud.influence_steps",
-                value: cloud.influence_steps,
-                allowed: "more than cloud.kill_steps",
-            });
-        }
         super::depth_camera::check(&self.depth.own_camera)?;
         super::check_distortion(&self.depth.distortion)
             .map_err(|what| ConfigError::DepthCamera { what })?;

@@ -98,7 +98,11 @@ impl Registration {
                 *at = seen.count;
             }
         }
-        Ok(DepthImage { size, counts })
+        Ok(DepthImage {
+            size,
+            counts,
+            later_s: image.later_s,
+        })
     }
 
     /// Where a ray of the depth camera ends in the registered image; `None` outside of it.
@@ -171,7 +175,7 @@ mod tests {
         }
         let size = rig.depth.size;
         let image = registration
-            .registered(&DepthImage { size, counts })
+            .registered(&DepthImage::new(size, counts))
             .expect("registered");
         let row = &image.counts[30 * 80..31 * 80];
         // 5 cm are 3.5 px at 1 m and 1 px at 3.5 m.
@@ -190,7 +194,7 @@ mod tests {
         let registration = Registration::new(&rig, rig.colour.size, 0.001).expect("a rig");
         let size = Size::new(8, 6);
         let counts = vec![1000; 48];
-        let said = registration.registered(&DepthImage { size, counts });
+        let said = registration.registered(&DepthImage::new(size, counts));
         assert!(said.expect_err("refused").contains("8x6"));
         let mut none = rig;
         none.depth.pinhole.focal_px.x = f64::NAN;

@@ -98,8 +98,8 @@ impl Document {
     }
 
     /// The tree of the markers in the last `window_s` seconds of what lies between two times, s. Who is
-    /// whose parent follows from `parents`, which are of the same names, and leave out who is not among them; without them from what the
-    /// capture was given; and where that says nothing, from the motion: a marker's parent is the next one
+    /// whose parent follows from `parents`, which are of the same names and leave out who is not among them; without
+    /// them from what the capture was given; and where that says nothing, from the motion: a marker's parent is the next one
     /// towards the foot on the branches of the tree of all points, on which it lies in the picture.
     ///
     /// # Errors

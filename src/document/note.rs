@@ -161,11 +161,11 @@ pub struct ScanNote {
     pub film: Option<ScanFilmNote>,
 }
 
-/// A piece of a filmed branch with a frequency, and the branches of the scan that it lies on, by their names.
+/// A piece of a filmed branch with a frequency, and the branches of the scan that were given it, by their names.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LaidBranch {
     pub film: String,
-    /// None where no wood of the scan lies there.
+    /// In the order of nodes; none where no branch was given it.
     pub scan: Vec<String>,
 }
 

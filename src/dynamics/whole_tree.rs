@@ -14,8 +14,9 @@ const SHARE_IN_KNOWN: f64 = 0.6;
 /// r(1 - cos Θ) of a swing sin ωt: its part at 2ω, for small angles, is this share of rΘ for each
 /// radian.
 const SECOND_ORDER: f64 = 0.25;
-/// Two frequencies are alike within their intervals, and within this share.
+/// Two frequencies are alike within their intervals, within the one share always, and never beyond the other.
 const ALIKE: f64 = 0.01;
+const UNLIKE: f64 = 0.03;
 
 /// A mode that turns some points about a place.
 struct Swing<'a> {
@@ -107,11 +108,12 @@ fn is_overtone(own: &Sway, trunk: &Sway) -> bool {
         return false;
     }
     let Interval { value, lo, hi } = own.frequency_hz;
-    let [low, high] = [lo.min((1.0 - ALIKE) * value), hi.max((1.0 + ALIKE) * value)];
-    let times = |n: f64| n * trunk.frequency_hz.value;
+    // A wide interval holds other modes, too.
+    let low = lo.clamp((1.0 - UNLIKE) * value, (1.0 - ALIKE) * value);
+    let high = hi.clamp((1.0 + ALIKE) * value, (1.0 + UNLIKE) * value);
     [2.0, 3.0]
         .into_iter()
-        .any(|n| (low..=high).contains(&times(n)))
+        .any(|n| (low..=high).contains(&(n * trunk.frequency_hz.value)))
 }
 
 /// The answers of `sways`, and the modes of `found` that are none of these.

@@ -120,8 +120,8 @@ impl fmt::Display for MarkerEvent {
             ),
             Self::CorrectionUnused { name, frame } => write!(
                 f,
-                "the correction of marker {name} in frame {frame} changes nothing: the film has no such frame after \
-                 the first that was followed; give one of the frames in tracks.csv"
+                "the correction of marker {name} in frame {frame} changes nothing: no frame with that number was \
+                 followed after the first; give one of the frames in tracks.csv"
             ),
             Self::Hung { names } => {
                 write!(f, "markers from the foot on: {}", names.join(", "))

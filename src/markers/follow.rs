@@ -145,14 +145,22 @@ impl MarkerTracker {
         self.add(&hsv, given, &elsewhere, time_s)
     }
 
-    /// Hangs the markers that are nearest to these places, px, on each other, the first nearest to the foot. A place that
-    /// is farther than `reach_px` from all markers means none; what speaks against it is an event.
-    pub fn hang(&mut self, places_px: &[Point2<f64>], reach_px: f64) {
+    /// Hangs the markers that are nearest to these places, px, on each other, the first nearest to the foot. A place
+    /// that is farther than `reach_px` from all markers means none; what speaks against it is an event.
+    /// Whether any parent has changed.
+    pub fn hang(&mut self, places_px: &[Point2<f64>], reach_px: f64) -> bool {
+        let before = self.windows();
         let event = match self.hung(places_px, reach_px) {
             Ok(names) => MarkerEvent::Hung { names },
             Err(why) => MarkerEvent::NotHung { why },
         };
         self.events.push(event);
+        self.windows() != before
+    }
+
+    /// Whether any marker is followed.
+    pub fn has_markers(&self) -> bool {
+        !self.markers.is_empty()
     }
 
     fn hung(&mut self, places_px: &[Point2<f64>], reach_px: f64) -> Result<Vec<String>, String> {
@@ -165,23 +173,33 @@ impl MarkerTracker {
                 order.push(nearest);
             }
         }
+        if order.len() < 2 {
+            return Err("click on two markers at least".to_owned());
+        }
         let mut windows = self.windows();
+        let ordered: Vec<String> = order.iter().map(|k| windows[*k].name.clone()).collect();
+        // An order that is given anew takes the place of the one before.
+        for k in &order {
+            windows[*k].parent = windows[*k]
+                .parent
+                .take()
+                .filter(|name| !ordered.contains(name));
+        }
         for pair in order.windows(2) {
             windows[pair[1]].parent = Some(windows[pair[0]].name.clone());
         }
         check_marker_names(&windows).map_err(|e| e.to_string())?;
-        let names = order.iter().map(|k| windows[*k].name.clone()).collect();
         for (marker, window) in self.markers.iter_mut().zip(windows) {
             marker.given = window;
         }
-        Ok(names)
+        Ok(ordered)
     }
 
     /// The marker that is nearest to a place, px, if one is near.
     fn nearest(&self, at_px: Point2<f64>, reach_px: f64) -> Option<usize> {
-        let off_px = |k: &usize| (self.markers[*k].way.at_px() - at_px).norm();
-        let nearest = (0..self.markers.len()).min_by(|a, b| off_px(a).total_cmp(&off_px(b)));
-        nearest.filter(|k| off_px(k) <= reach_px)
+        let offs_px = self.markers.iter().map(|m| (m.way.at_px() - at_px).norm());
+        let (nearest, off_px) = offs_px.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
+        (off_px <= reach_px).then_some(nearest)
     }
 
     /// The markers as they were given or found, in the order of their ids.

@@ -76,10 +76,12 @@ impl Pinhole {
 
 /// A depth image as the sensor gives it, row by row: counts of its unit along the axis of the colour
 /// camera, with whose picture it is registered; 0 where nothing was measured.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
     pub size: Size,
     pub counts: Vec<u16>,
+    /// How much later than its picture it was taken, by the stamps of both as far as they are set right, s.
+    pub later_s: f64,
 }
 
 /// Length of a count of [`DepthImage::from_metres`], m: below the noise of all sensors from 1 m on.
@@ -95,14 +97,23 @@ impl DepthImage {
             let is_depth = (1.0..f64::from(u16::MAX)).contains(&count);
             counts.push(if is_depth { count as u16 } else { 0 });
         }
-        (counts.len() == size.area()).then_some(Self { size, counts })
+        (counts.len() == size.area()).then_some(Self::new(size, counts))
+    }
+
+    /// An image of the moment of its picture.
+    pub fn new(size: Size, counts: Vec<u16>) -> Self {
+        Self {
+            size,
+            counts,
+            later_s: 0.0,
+        }
     }
 
     /// An image of counts of two bytes, the lower first; `None` where there are too few.
     pub fn from_bytes(size: Size, bytes: &[u8]) -> Option<Self> {
         let pixels = bytes.chunks_exact(2).take(size.area());
         let counts: Vec<u16> = pixels.map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-        (counts.len() == size.area()).then_some(Self { size, counts })
+        (counts.len() == size.area()).then_some(Self::new(size, counts))
     }
 
     /// Memory that it takes, bytes.
@@ -235,6 +246,7 @@ mod tests {
         let image = DepthImage {
             size: Size::new(2, 2),
             counts: vec![0, 900, u16::MAX, 7],
+            later_s: 0.0,
         };
         let at = |u, v| image.count(u, v);
         assert_eq!(

@@ -38,6 +38,8 @@ pub(super) struct MarkerStage {
     picked_px: Vec<Point2<f64>>,
     /// Places of markers that hang on each other in this order, px.
     orders_px: Vec<Vec<Point2<f64>>>,
+    /// What could not be done.
+    refused: Vec<MarkerEvent>,
     /// Those that are in the tracks.
     joined: BTreeSet<TrackId>,
     error: Option<MarkerError>,
@@ -52,6 +54,7 @@ impl MarkerStage {
             tracker: None,
             picked_px: Vec::new(),
             orders_px: Vec::new(),
+            refused: Vec::new(),
             joined: BTreeSet::new(),
             error: None,
             are_new: false,
@@ -86,8 +89,7 @@ impl MarkerStage {
             self.are_new = true;
         }
         for places_px in self.orders_px.drain(..) {
-            tracker.hang(&places_px, MEANT_PX * scale);
-            self.are_new = true;
+            self.are_new |= tracker.hang(&places_px, MEANT_PX * scale);
         }
         tracker.step(frame.index, frame.time_s, &picture, depths)
     }
@@ -125,8 +127,18 @@ impl MarkerStage {
         self.picked_px.extend(places_px);
     }
 
+    /// Hangs markers on each other in the next frame; where none are followed, nothing can.
     pub fn hang(&mut self, places_px: Vec<Point2<f64>>) {
-        self.orders_px.push(places_px);
+        let are_followed = self
+            .tracker
+            .as_ref()
+            .is_some_and(MarkerTracker::has_markers);
+        if are_followed || !self.picked_px.is_empty() {
+            self.orders_px.push(places_px);
+        } else {
+            let why = "none are followed yet; pick them first (key c)".to_owned();
+            self.refused.push(MarkerEvent::NotHung { why });
+        }
     }
 
     pub fn finish(&mut self) {
@@ -136,9 +148,11 @@ impl MarkerStage {
     }
 
     pub fn take_events(&mut self) -> Vec<MarkerEvent> {
-        self.tracker
-            .as_mut()
-            .map_or(Vec::new(), MarkerTracker::take_events)
+        let mut events = std::mem::take(&mut self.refused);
+        if let Some(tracker) = &mut self.tracker {
+            events.extend(tracker.take_events());
+        }
+        events
     }
 
     pub fn take_error(&mut self) -> Option<MarkerError> {

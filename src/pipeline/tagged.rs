@@ -94,9 +94,17 @@ impl TagStage {
             self.fix();
         }
         if self.frames == FRAMES_WITHOUT && self.sights.is_empty() {
-            self.news.push(TagNews::NoneSeen);
+            self.say_none_seen();
         }
         in_frame
+    }
+
+    /// Says that none is seen. A film with depth does without it from then on: one capture has one scale.
+    fn say_none_seen(&mut self) {
+        self.news.push(TagNews::NoneSeen);
+        if depth::format(&self.depth).is_some() {
+            self.settings.size_m = 0.0;
+        }
     }
 
     fn keep(&mut self, seen: Option<TagSeen>) {
@@ -118,6 +126,10 @@ impl TagStage {
 
     /// There are no more frames.
     pub fn finish(&mut self) {
+        let is_short = self.settings.size_m > 0.0 && self.frames < FRAMES_WITHOUT;
+        if is_short && self.sights.is_empty() {
+            self.say_none_seen();
+        }
         match self.scale {
             None => self.fix(),
             Some(fixed) => {

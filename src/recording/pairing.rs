@@ -1,7 +1,7 @@
 //! Pictures and depth images that come in turns, each with its own time: which belong together.
 
 use super::image::Picture;
-use crate::model::{DEPTH_APART_S, DepthImage, RawFrame, nanoseconds};
+use crate::model::{DEPTH_APART_S, DepthImage, RawFrame, nanoseconds, seconds};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -9,8 +9,10 @@ use std::sync::Arc;
 const APART_NS: u64 = (1e9 * DEPTH_APART_S) as u64;
 /// A picture waits for its depth until something is so much later, ns; longer where depth is known to be late.
 const PATIENCE_NS: i64 = 100_000_000;
-/// So many pictures and so many depth images are held at most: a quarter of a second at 60 frames/s.
-const HELD: usize = 16;
+/// So many pictures and so many depth images are held at most, and those of the time by which depth is late at a
+/// rate of so many frames/s.
+const HELD: usize = 8;
+const HIGHEST_RATE_HZ: f64 = 120.0;
 
 /// What waits for its depth image.
 pub trait AwaitsDepth {
@@ -48,6 +50,8 @@ pub struct Pairing<P> {
     newest_ns: Option<i64>,
     /// How much later depth images are stamped than they were taken, ns.
     late_ns: i64,
+    patience_ns: i64,
+    held: usize,
 }
 
 #[derive(Debug)]
@@ -70,6 +74,8 @@ impl<P> Default for Pairing<P> {
             depths: VecDeque::new(),
             newest_ns: None,
             late_ns: 0,
+            patience_ns: PATIENCE_NS,
+            held: HELD,
         }
     }
 }
@@ -77,9 +83,20 @@ impl<P> Default for Pairing<P> {
 impl<P: AwaitsDepth> Pairing<P> {
     /// For depth images that are stamped so much later than they were taken, s.
     pub fn late_by(late_s: f64) -> Self {
+        let late_ns = nanoseconds(late_s);
         Self {
-            late_ns: nanoseconds(late_s),
+            late_ns,
+            patience_ns: PATIENCE_NS + late_ns.max(0),
+            held: HELD + (HIGHEST_RATE_HZ * late_s.max(0.0)).ceil() as usize,
             ..Self::default()
+        }
+    }
+
+    /// For two streams of one file, which are read in turns: pictures wait until the depth image after them is read.
+    pub fn in_turns(late_s: f64) -> Self {
+        Self {
+            patience_ns: i64::MAX,
+            ..Self::late_by(late_s)
         }
     }
 
@@ -93,7 +110,7 @@ impl<P: AwaitsDepth> Pairing<P> {
     pub fn depth(&mut self, stamp_ns: i64, image: Arc<DepthImage>) {
         let time_ns = stamp_ns.saturating_sub(self.late_ns);
         self.seen(time_ns);
-        if self.depths.len() == HELD {
+        if self.depths.len() == self.held {
             self.depths.pop_front();
         }
         self.depths.push_back(Timed { time_ns, image });
@@ -110,8 +127,7 @@ impl<P: AwaitsDepth> Pairing<P> {
         let waited = self
             .newest_ns
             .map_or(0, |newest| newest.saturating_sub(time_ns));
-        let patience_ns = PATIENCE_NS + self.late_ns.max(0);
-        if is_passed || waited > patience_ns || self.pictures.len() > HELD {
+        if is_passed || waited > self.patience_ns || self.pictures.len() > self.held {
             self.oldest()
         } else {
             None
@@ -131,9 +147,12 @@ impl<P: AwaitsDepth> Pairing<P> {
             next.is_none_or(|next| depth.apart_ns(time_ns) <= depth.apart_ns(next))
         });
         if let Some(k) = nearest {
-            picture.set_depth(self.depths[k].image.clone());
             // It and those before it belong to no later picture.
-            self.depths.drain(..=k);
+            if let Some(mut depth) = self.depths.drain(..=k).next_back() {
+                let later_ns = depth.time_ns.saturating_sub(time_ns);
+                Arc::make_mut(&mut depth.image).later_s = seconds(later_ns);
+                picture.set_depth(depth.image);
+            }
         }
         Some(picture)
     }
@@ -161,6 +180,7 @@ mod tests {
         Arc::new(DepthImage {
             size: Size::new(1, 1),
             counts: vec![count],
+            later_s: 0.0,
         })
     }
 
@@ -212,6 +232,25 @@ mod tests {
                 .all(|(k, depth)| depth.map(i64::from) == Some(*k)),
             "{pairs:?}"
         );
+    }
+
+    /// A film of 15 frames/s: the patience of a camera ended before any depth was read.
+    #[test]
+    fn pictures_of_a_file_wait_for_depth_that_is_read_in_turns() {
+        let mut pairing = Pairing::in_turns(0.05);
+        for k in 0..5 {
+            pairing.picture(picture(67 * k));
+        }
+        assert!(pairing.ready().is_none());
+        pairing.depth((67 + 50 + 3) * MS, depth(7));
+        assert_eq!(of(pairing.ready()), None);
+        let second = pairing
+            .ready()
+            .expect("a picture")
+            .depth
+            .expect("its depth");
+        assert_eq!(second.counts[0], 7);
+        assert!((second.later_s - 0.003).abs() < 1e-9);
     }
 
     #[test]

@@ -40,6 +40,8 @@ pub struct Reader<R = File> {
     broken: Option<String>,
     /// Depth images are taken.
     wants_depth: bool,
+    /// Depth of our own recordings is paired with pictures by its times, too.
+    pairs_anew: bool,
     own_depth: Option<OwnDepth>,
     foreign: Foreign,
 }
@@ -122,6 +124,7 @@ impl<R: Read + Seek> Reader<R> {
             unreadable: 0,
             broken: None,
             wants_depth: true,
+            pairs_anew: false,
             own_depth: None,
             foreign: Foreign::default(),
         }
@@ -132,10 +135,11 @@ impl<R: Read + Seek> Reader<R> {
         self.wants_depth = false;
     }
 
-    /// For depth images of other programs that are stamped so much later than they were taken, s. Those of our own
-    /// recordings lie with their pictures.
+    /// For depth images that are stamped so much later than they were taken, s. Those of our own recordings, which lie
+    /// with their pictures, are paired anew then.
     pub fn set_depth_late(&mut self, late_s: f64) {
         self.foreign.pairing = Pairing::late_by(late_s);
+        self.pairs_anew = late_s != 0.0;
     }
 
     /// Whether there is depth that is wanted, as far as is known by now.
@@ -264,7 +268,7 @@ impl<R: Read + Seek> Reader<R> {
             Role::Picture => {
                 let is_own = channel.counted.is_some();
                 let picture = self.picture(head)?;
-                if is_own || !self.has_depth() {
+                if (is_own && !self.pairs_anew) || !self.has_depth() {
                     return Some(picture);
                 }
                 self.foreign.pairing.picture(picture);
@@ -272,9 +276,17 @@ impl<R: Read + Seek> Reader<R> {
             Role::Depth if self.wants_depth && channel.is_own_depth() => {
                 let decoded = decode_depth(content);
                 self.unreadable += u64::from(decoded.is_none());
-                self.own_depth = decoded.map(|decoded| OwnDepth {
+                let image = decoded.map(|decoded| Arc::new(decoded.image));
+                if self.pairs_anew {
+                    let time_ns = self.sensor_time_ns(head.publish_ns);
+                    if let (Some(image), Some(time_ns)) = (image, time_ns) {
+                        self.foreign.pairing.depth(time_ns, image);
+                    }
+                    return None;
+                }
+                self.own_depth = image.map(|image| OwnDepth {
                     publish_ns: head.publish_ns,
-                    image: Arc::new(decoded.image),
+                    image,
                 });
             }
             Role::Depth if self.wants_depth => {

@@ -152,7 +152,7 @@ pub fn depth(layout: Layout, message: &[u8]) -> Option<RosDepth> {
     let size = image.size;
     Some(RosDepth {
         stamp,
-        image: DepthImage { size, counts },
+        image: DepthImage::new(size, counts),
         unit_m: said_m.unwrap_or(ROS_UNIT_M),
         is_in_metres: false,
     })

@@ -9,6 +9,11 @@ const DISTANCES_M: std::ops::RangeInclusive<f64> = 0.2..=300.0;
 /// known to 1 %, and depth cameras to some percent.
 const ONE_SCALE: f64 = 0.1;
 
+/// Whether two scales, m, are not of one film.
+pub fn scales_differ(one_m: f64, other_m: f64) -> bool {
+    (one_m / other_m).ln().abs() > ONE_SCALE
+}
+
 /// Takes the scale that depth gives of `model` into the settings, if neither the user nor a tag gives
 /// one; `None` where it changes nothing. One capture has one scale: that of its first tree.
 pub fn take_scale_of_depth(config: &mut Config, model: Option<&Model>) -> Option<String> {
@@ -37,7 +42,7 @@ fn doubt(config: &Config, foot_m: f64, metres_per_px: f64) -> Option<String> {
         ));
     }
     let given = config.export.metres_per_px;
-    let is_other = given > 0.0 && (metres_per_px / given).ln().abs() > ONE_SCALE;
+    let is_other = given > 0.0 && scales_differ(metres_per_px, given);
     let (by, advice) = match config.tag.size_m > 0.0 {
         true => (
             "the tag",

@@ -51,6 +51,7 @@ mod unfinished;
 mod watched;
 
 pub use asked::{Answer, Asked};
+pub use depth_scale::scales_differ;
 pub use finish::Written;
 pub use job::{Job, Summary};
 pub use one_frame::{FrameError, one_frame};

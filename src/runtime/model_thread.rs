@@ -504,6 +504,7 @@ impl ModelThread {
         let mut config = reloaded.unwrap_or_else(|| self.job.config.clone());
         config.export.metres_per_px = self.job.config.export.metres_per_px;
         config.markers.windows = self.job.config.markers.windows.clone();
+        config.tag.size_m = self.job.config.tag.size_m;
         config.depth = self.job.config.depth.clone();
         config.skeleton.strokes_px = self.back.strokes_px().to_vec();
         config

@@ -5,10 +5,8 @@ use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use crate::config::MarkerWindow;
-use crate::depth::DepthLag;
-use crate::model::{
-    Control, DEPTH_APART_S, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame,
-};
+use crate::depth::{DepthLag, LONGEST_LAG_S};
+use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame};
 use crate::outline::{self, Scribbles};
 use crate::pipeline::{DecodeStage, Followed, FrontEnd, TagNews, Undecoded};
 use crate::source::DecodeError;
@@ -22,9 +20,9 @@ const MATTING_WIDTH: u32 = 960;
 /// Damaged frames that are reported one by one; further ones are only counted.
 const DAMAGE_REPORTED: u64 = 5;
 
-/// The warning where no tag is seen that was said to be there.
+/// The warning where no tag is seen that was said to be there; in a film with depth, and without.
 const NO_TAG_BUT_DEPTH: &str =
-    "no tag of the family 36h11 is seen: lengths are by the depth of the film";
+    "no tag of the family 36h11 is seen: lengths are by the depth of the film, if that holds";
 const NO_TAG: &str = "no tag of the family 36h11 is seen: lengths stay in pixels; print it larger, with its \
                       white rim, or hang it in the light (--tag)";
 
@@ -360,20 +358,31 @@ fn dispute_line(off_px: f64) -> String {
 /// The warning where the clocks of colour and depth do not agree, by the tree's motion in both.
 fn lag_line(lag: &DepthLag) -> Option<String> {
     if lag.drifts() {
+        let way = match lag.drift > 0.0 {
+            true => "falls behind",
+            false => "runs ahead",
+        };
         return Some(format!(
-            "the clocks of colour and depth do not run alike: by the tree's motion in both, depth falls behind by {:.1} \
-             ms each second; depths of what moves are of another moment: set the times right, or give --no-depth",
-            1000.0 * lag.drift
+            "the clocks of colour and depth do not run alike: by the tree's motion in both, depth {way} by {:.1} ms \
+             each second, and depths of what moves are of another moment: set the times right, or give --no-depth",
+            1000.0 * lag.drift.abs()
         ));
     }
-    let late_s = lag.late_s;
-    let word = if late_s > 0.0 { "later" } else { "earlier" };
+    let way = match lag.late_s > 0.0 {
+        true => "later",
+        false => "earlier",
+    };
+    let late_s = lag.given_s + lag.late_s;
+    let advice = match late_s.abs() <= LONGEST_LAG_S {
+        true => format!("give --depth-late {late_s:.3}"),
+        false => "set the times right, or give --no-depth".to_owned(),
+    };
     lag.is_late().then(|| {
         format!(
-            "by the tree's motion in both, depth images are stamped {:.3} s {word} than they were taken (within {DEPTH_APART_S} s): \
-             give --depth-late {:.3}",
-            late_s.abs(),
-            lag.given_s + late_s
+            "by the tree's motion in both, depth images are stamped {:.3} s {way} than they were taken (±{:.3} s): \
+             {advice}",
+            lag.late_s.abs(),
+            2.0 * lag.late_sd_s
         )
     })
 }
@@ -387,4 +396,37 @@ fn tag_line(scale: &TagScale) -> String {
         100.0 * scale.relative_error(),
         scale.roll_deg
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(late_s: f64, drift: f64, given_s: f64) -> String {
+        let lag = DepthLag {
+            given_s,
+            late_s,
+            late_sd_s: 0.001,
+            drift,
+            drift_sd: 0.0001,
+            span_s: 20.0,
+        };
+        lag_line(&lag).unwrap_or_default()
+    }
+
+    #[test]
+    fn clocks_that_do_not_agree_are_named_with_what_to_do() {
+        assert_eq!(said(0.015, 0.0005, 0.0), "");
+        assert!(
+            said(0.05, 0.0, 0.02)
+                .contains("0.050 s later than they were taken (±0.002 s): give --depth-late 0.070")
+        );
+        assert!(
+            said(-0.05, 0.0, 0.0).contains("0.050 s earlier")
+                && said(-0.05, 0.0, 0.0).contains("--depth-late -0.050")
+        );
+        assert!(said(0.1, 0.0, 0.2).ends_with("set the times right, or give --no-depth"));
+        assert!(said(0.1, -0.02, 0.0).contains("runs ahead by 20.0 ms each second"));
+        assert!(said(0.1, 0.02, 0.0).contains("falls behind by 20.0 ms"));
+    }
 }

@@ -50,11 +50,13 @@ impl SaidOfDepth {
             ));
         };
         camera.pinhole.check(picture).map_err(|why| {
-            let what = format!(
-                "its camera cannot be one: {why}; correct what the film says of it, or give --depth-camera FILE, or \
-                 --no-depth for the colours alone"
-            );
-            SourceError::bad_format(path, what)
+            let advice = match given {
+                Some(_) => "correct --depth-camera, or what the settings say of it in [depth]",
+                None => {
+                    "correct what the film says of it, or give --depth-camera FILE, or --no-depth for the colours alone"
+                }
+            };
+            SourceError::bad_format(path, format!("its camera cannot be one: {why}; {advice}"))
         })?;
         let given = Some(settings.unit_m).filter(|unit_m| *unit_m > 0.0 && !self.is_in_metres);
         let Some(unit_m) = given.or(self.unit_m) else {

@@ -103,6 +103,7 @@ mod tests {
         let [sound, holes] = [[0, 2000], [0, 0]].map(|counts| DepthImage {
             size: Size::new(2, 1),
             counts: counts.to_vec(),
+            later_s: 0.0,
         });
         for k in 0..90 {
             let time_s = 50.0 + f64::from(k) / 30.0;

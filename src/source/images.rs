@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 const OF_A_CAPTURE: [&str; 2] = ["capture.json", "nodes.csv"];
 
 /// Beside a video fewer pictures than this are no film.
-const FEW_PICTURES: usize = 30;
+const FEW_PICTURES: usize = 10;
 const PICTURES: [&str; 4] = ["png", "jpg", "jpeg", "bmp"];
 const VIDEOS: [&str; 6] = ["mkv", "mp4", "mov", "avi", "mcap", "bag"];
 
@@ -50,7 +50,10 @@ impl Images {
         }
         if let Some(video) = videos.iter().min().filter(|_| files.len() < FEW_PICTURES) {
             let name = video.file_name().unwrap_or_default().to_string_lossy();
-            let what = format!("{name} is in it, and few pictures or none: give that file");
+            let what = format!(
+                "{name} is in it, and few pictures: give that file, or take it out of the folder for a film of the \
+                 pictures"
+            );
             return Err(SourceError::bad_format(folder, what));
         }
         files.sort_by(|a, b| by_name(&a.to_string_lossy(), &b.to_string_lossy()));
@@ -210,6 +213,17 @@ fn take_number<'a>(text: &mut &'a str) -> &'a str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_video_beside_few_pictures_is_named() {
+        let dir = tempfile::tempdir().expect("tempdir");
+        for name in ["wood.png", "leaves.png", "video.mkv"] {
+            std::fs::write(dir.path().join(name), "").expect("write");
+        }
+        let refused = Images::open(dir.path(), 30.0).err().expect("no film");
+        let said = refused.to_string();
+        assert!(said.contains("video.mkv is in it"), "{said}");
+    }
 
     #[test]
     fn a_capture_is_no_film() {

@@ -137,7 +137,7 @@ impl Kinect {
             path: path.to_owned(),
             colour,
             depth: VideoPipe::start(path, "ffmpeg", &stream, PixelFormat::DEPTH[0])?,
-            pairing: Pairing::late_by(known.format.late_s),
+            pairing: Pairing::in_turns(known.format.late_s),
             must_wait: WAITING + (known.format.late_s.max(0.0) * HIGHEST_RATE_HZ).ceil() as u64,
             known,
             waiting: 0,

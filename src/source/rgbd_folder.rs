@@ -35,7 +35,7 @@ pub(super) struct RgbdFolder {
     folder: PathBuf,
     frames: Vec<Listed>,
     /// The depth image that belongs to each of the frames.
-    depths: Vec<Option<PathBuf>>,
+    depths: Vec<Option<Listed>>,
     known: Option<KnownDepth>,
     next: usize,
     size: Size,
@@ -91,9 +91,9 @@ impl RgbdFolder {
 
     fn take_depth(&mut self, settings: &config::Depth) -> Result<(), SourceError> {
         let mut listed = read_list(&self.folder, DEPTHS)?;
-        listed
-            .iter_mut()
-            .for_each(|depth| depth.time_s -= settings.late_s);
+        for depth in &mut listed {
+            depth.time_s -= settings.late_s;
+        }
         if listed.is_empty() {
             return Err(SourceError::bad_format(
                 &self.folder,
@@ -101,7 +101,7 @@ impl RgbdFolder {
             ));
         }
         self.depths = paired(&self.frames, &listed);
-        let Some(first) = self.depths.iter().flatten().next().cloned() else {
+        let Some(first) = self.depths.iter().flatten().next() else {
             let nearest_s = least_apart_s(&self.frames, &listed);
             return Err(SourceError::bad_format(
                 &self.folder,
@@ -112,6 +112,7 @@ impl RgbdFolder {
                 ),
             ));
         };
+        let first = first.file.clone();
         let image = read_depth(&first)
             .map_err(|why| SourceError::bad_format(&first, format!("{why}; {INSTEAD}")))?;
         let known = self
@@ -166,10 +167,11 @@ impl RgbdFolder {
 
     /// The depth image of frame `k`, if there is one that can be used.
     fn depth(&mut self, k: usize) -> Option<Arc<DepthImage>> {
-        let (file, known) = (self.depths[k].clone()?, self.known.as_ref()?);
+        let (Listed { time_s, file }, known) = (self.depths[k].clone()?, self.known.as_ref()?);
+        let later_s = time_s - self.frames[k].time_s;
         let read = read_depth(&file).and_then(|image| known.usable(image));
         match read {
-            Ok(image) => Some(Arc::new(image)),
+            Ok(image) => Some(Arc::new(DepthImage { later_s, ..image })),
             Err(why) => {
                 self.tally.unreadable(format!("{}: {why}", file.display()));
                 None
@@ -269,6 +271,7 @@ pub(super) fn depth_of_png(bytes: &[u8]) -> Result<DepthImage, String> {
         image::DynamicImage::ImageLuma16(image) => Ok(DepthImage {
             size: Size::new(image.width(), image.height()),
             counts: image.into_raw(),
+            later_s: 0.0,
         }),
         image::DynamicImage::ImageLuma8(_) => {
             Err("it has 8 bits of grey, and depth is a PNG with 16 bits of grey".to_owned())
@@ -319,13 +322,13 @@ fn parse_list(folder: &Path, text: &str) -> Result<Vec<Listed>, String> {
 
 /// For every frame the depth image that is nearest in time, if the frame is the nearest to that as well
 /// and the two are no further apart than [`DEPTH_APART_S`].
-fn paired(frames: &[Listed], depths: &[Listed]) -> Vec<Option<PathBuf>> {
+fn paired(frames: &[Listed], depths: &[Listed]) -> Vec<Option<Listed>> {
     let mut out = Vec::with_capacity(frames.len());
     for (k, frame) in frames.iter().enumerate() {
         let depth = nearest(depths, frame.time_s);
         let is_pair = nearest(frames, depths[depth].time_s) == k
             && (depths[depth].time_s - frame.time_s).abs() <= DEPTH_APART_S;
-        out.push(is_pair.then(|| depths[depth].file.clone()));
+        out.push(is_pair.then(|| depths[depth].clone()));
     }
     out
 }
@@ -369,7 +372,7 @@ mod tests {
         let frames = list(&[1.000, 1.033, 1.067, 1.100, 1.133]);
         let depths = list(&[0.995, 1.040, 1.048, 1.121, 1.300]);
         let pairs = paired(&frames, &depths);
-        let names: Vec<Option<&str>> = pairs.iter().map(|p| p.as_ref()?.to_str()).collect();
+        let names: Vec<Option<&str>> = pairs.iter().map(|p| p.as_ref()?.file.to_str()).collect();
         assert_eq!(
             names,
             [Some("0.995"), Some("1.04"), None, None, Some("1.121")]

@@ -141,7 +141,7 @@ impl FilmOnScan {
         if !off.is_empty() {
             let names: Vec<&str> = off.iter().map(|laid| laid.film.as_str()).collect();
             lines.push(format!(
-                "branches of the film with a frequency that lie on no branch of the scan: {}",
+                "branches of the film with a frequency that no branch of the scan was given: {}",
                 names.join(", ")
             ));
         }

@@ -10,7 +10,7 @@ use crate::document::{Document, DocumentError};
 use crate::model::{BotanicalBranches, NodeId, Skeleton, Swaying, Unidentified};
 use crate::signal::distance_to_segment;
 use nalgebra::{Point2, Point3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// A point is on no wood whose bark is farther off in the picture than this share of the tree's
 /// height: a registration is not off by more.
@@ -57,8 +57,7 @@ pub fn filmed_points(film: &Document) -> Result<Vec<FilmedPoint>, DocumentError>
 pub struct ScanSway {
     /// By node index of the scan.
     pub sway: Vec<Swaying>,
-    /// Pieces of filmed branches with a frequency, and the scanned branches that have it: none where no wood of the
-    /// scan lies there.
+    /// Pieces of filmed branches with a frequency, and the scanned branches that were given it.
     pub laid: Vec<LaidBranch>,
 }
 
@@ -104,10 +103,10 @@ pub fn sway_on_scan(
         }
     }
     let mut sway = vec![Err(Unidentified::NotMeasured); scan.nodes.len()];
-    let mut laid = BTreeMap::<NodeId, BTreeSet<String>>::new();
+    let mut laid = BTreeMap::<NodeId, Vec<String>>::new();
     for node in film.skeleton.measured_branches() {
         if film.sway.get(node.index()).is_some_and(Result::is_ok) {
-            laid.insert(node, BTreeSet::new());
+            laid.insert(node, Vec::new());
         }
     }
     for piece in scan.measured_branches() {
@@ -127,18 +126,19 @@ pub fn sway_on_scan(
             && let Some(on) = laid.get_mut(&node)
         {
             sway[piece.index()] = film.sway[node.index()];
-            on.insert(names.name(piece));
+            let name = names.name(piece);
+            if !on.contains(&name) {
+                on.push(name);
+            }
         }
     }
     let film_names = film.skeleton.botanical_branches().piece_names();
-    let named = |(node, scan): (NodeId, BTreeSet<String>)| LaidBranch {
-        film: film_names[node.index()].clone(),
-        scan: scan.into_iter().collect(),
-    };
-    ScanSway {
-        sway,
-        laid: laid.into_iter().map(named).collect(),
+    let mut named = Vec::with_capacity(laid.len());
+    for (node, scan) in laid {
+        let film = film_names[node.index()].clone();
+        named.push(LaidBranch { film, scan });
     }
+    ScanSway { sway, laid: named }
 }
 
 /// Whether the branch that ends in a node begins at the foot.

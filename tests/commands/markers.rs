@@ -224,6 +224,10 @@ fn two_markers_tell_the_frequencies_of_two_branches() {
     scene.markers(&format!("{}, {}", window("A", a, ""), window("B", b, "")));
     let found = branches(&scene, "out --markers=markers.json");
     assert!(found.iter().all(|b| b["parent_id"].is_null()), "{found:?}");
+    // One that the file does not name is left out.
+    scene.markers(&window("A", a, ""));
+    let found = branches(&scene, "out --markers=markers.json");
+    assert_eq!(found.len(), 1, "{found:?}");
     scene.markers(&window("C", a, ""));
     let output = scene.run("analyze out --markers=markers.json");
     assert!(

@@ -82,6 +82,7 @@ fn our_own_depth_comes_back_to_the_byte() {
         let depth = DepthImage {
             size: SMALL,
             counts,
+            later_s: 0.0,
         };
         frames.push(RawFrame {
             sequence: Some(n),

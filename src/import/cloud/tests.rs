@@ -102,6 +102,12 @@ fn ply_is_read_as_text_and_as_bytes_and_to_its_end() {
 fn pcd_is_read_in_its_three_ways() {
     let text = format!("{PCD}DATA ascii\n{TEXT}");
     expected(&read_bytes(text.as_bytes(), CloudFormat::Pcd).expect("sound"));
+    let other = text.replace("DATA ascii", "WIDTH 2\nHEIGHT 1\nDATA ascii");
+    let refused = read_bytes(other.as_bytes(), CloudFormat::Pcd).expect_err("another number");
+    assert!(
+        refused.to_string().contains("WIDTH 2 times HEIGHT 1"),
+        "{refused}"
+    );
     let more = format!("{text}\n7 8 9 10\n11 12 13 14\n");
     let said = said_too_few(more.as_bytes(), CloudFormat::Pcd).1;
     assert_eq!(said, Some((3, 5)));

@@ -68,6 +68,7 @@ fn depth(k: u64) -> RawFrame {
     let image = DepthImage {
         size: SIZE,
         counts: vec![1 + k as u16; 4],
+        later_s: 0.0,
     };
     RawFrame {
         sensor_time_s: picture(k).sensor_time_s + 0.004,
