@@ -6,7 +6,7 @@ mod lag;
 mod register;
 
 pub use gate::DepthGate;
-pub use lag::{DepthLag, LONGEST_LAG_S, LagMeter};
+pub use lag::{DepthLag, LagMeter};
 pub use register::Registration;
 
 use crate::config;

@@ -4,13 +4,12 @@
 
 use super::{DepthReader, Pixel};
 use crate::config;
-use crate::model::{DEPTH_APART_S, DepthImage, Size, TrackId, TrackSet};
+use crate::model::{DEPTH_APART_S, DepthImage, LONGEST_LAG_S, Size, TrackId, TrackSet};
 use nalgebra::{Point2, Vector2};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Longest lag that is looked for, s, and the steps in which it is.
-pub const LONGEST_LAG_S: f64 = 0.25;
+/// Lags are looked for in so many steps to each side.
 const STEPS: usize = 15;
 const STEP_S: f64 = LONGEST_LAG_S / STEPS as f64;
 const LAGS: usize = 2 * STEPS + 1;

@@ -7,6 +7,8 @@ use std::collections::BTreeMap;
 /// A picture and a depth image that are further apart in time do not belong together, s (Sturm et al.
 /// 2012).
 pub const DEPTH_APART_S: f64 = 0.02;
+/// Depth images may be stamped later or earlier than they were taken by this at most, s.
+pub const LONGEST_LAG_S: f64 = 0.25;
 
 /// Focal lengths across and down are in this proportion: pixels are squares, or of television.
 const FOCAL_RATIOS: std::ops::RangeInclusive<f64> = 0.5..=2.0;

@@ -49,8 +49,8 @@ pub use camera_motion::{Agreement, Background, CameraMotion};
 pub use capture_facts::{CaptureFacts, FilmCut, KnownMode, PointFacts, Shake, SwayFacts};
 pub use control::Control;
 pub use depth::{
-    DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, METRES_UNIT_M, NodeDepth, Pinhole,
-    RestDepths, depth_in_model_px,
+    DEPTH_APART_S, DepthFormat, DepthImage, DepthSeen, LONGEST_LAG_S, METRES_UNIT_M, NodeDepth,
+    Pinhole, RestDepths, depth_in_model_px,
 };
 pub use depth_rig::{CameraModel, DepthRig};
 pub use foot::{Foot, FootBasis, TrunkRow};

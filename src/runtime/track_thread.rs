@@ -5,8 +5,10 @@ use super::first_picture::FirstPicture;
 use super::pulse::Worker;
 use super::shared::{Failure, Shared};
 use crate::config::MarkerWindow;
-use crate::depth::{DepthLag, LONGEST_LAG_S};
-use crate::model::{Control, Frame, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame};
+use crate::depth::DepthLag;
+use crate::model::{
+    Control, Frame, LONGEST_LAG_S, Outline, Picture, Rgb, Size, TagScale, TagState, TimedFrame,
+};
 use crate::outline::{self, Scribbles};
 use crate::pipeline::{DecodeStage, Followed, FrontEnd, TagNews, Undecoded};
 use crate::source::DecodeError;
