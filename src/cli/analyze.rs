@@ -460,11 +460,8 @@ fn often_lost(marked: &MarkedTree) -> Option<String> {
 
 /// The warning where the user gives a scale that is not that of the capture.
 fn other_scale(args: &AnalyzeArgs, document: &Document) -> Option<String> {
-    let own = document.metres_per_px();
-    let mut config = Config::default();
-    args.scale.set(&mut config);
-    let given = config.export.metres_per_px;
-    let is_other = own > 0.0 && given > 0.0 && scales_differ(given, own);
+    let (own, given) = (document.metres_per_px(), args.scale.metres_per_px()?);
+    let is_other = own > 0.0 && scales_differ(given, own);
     is_other.then(|| {
         format!(
             "a pixel is {given:.5} m long by the given scale, and {own:.5} m by the capture; the given one counts: see \

@@ -70,16 +70,18 @@ struct Known {
 impl ScaleArgs {
     /// Whether any option is given.
     pub fn is_given(&self) -> bool {
-        self.metres_per_px.is_some() || self.scale.is_some()
+        self.metres_per_px().is_some()
+    }
+
+    /// The scale that is given.
+    pub fn metres_per_px(&self) -> Option<f64> {
+        let known = self.scale.map(|known| known.metres_per_px);
+        known.or(self.metres_per_px)
     }
 
     /// Applies the options of the command line.
     pub fn set(&self, config: &mut Config) {
-        if let Some(metres) = self
-            .scale
-            .map(|known| known.metres_per_px)
-            .or(self.metres_per_px)
-        {
+        if let Some(metres) = self.metres_per_px() {
             config.export.metres_per_px = metres;
         }
     }

@@ -339,6 +339,11 @@ mod tests {
         colonise_bare(points, Point3::origin(), 1.0, &Colonisation::ALONG_WOOD)
     }
 
+    fn grown_along(middles: &RawTree, points: &[Point3<f32>]) -> RawTree {
+        let lengths = Colonisation::ALONG_WOOD;
+        colonise(middles, points, Point3::origin(), 1.0, &lengths)
+    }
+
     /// A middle at each point.
     fn middles_at(points: &[Point3<f32>], parent: impl Fn(usize) -> Option<usize>) -> RawTree {
         let mut middles = RawTree::default();
@@ -381,13 +386,7 @@ mod tests {
                 if i == 60 { Some(20) } else { i.checked_sub(1) }
             },
         );
-        let tree = colonise(
-            &middles,
-            &points,
-            Point3::origin(),
-            1.0,
-            &Colonisation::ALONG_WOOD,
-        );
+        let tree = grown_along(&middles, &points);
         let mut node = tree.of_point[points.len() - 1] as usize;
         let mut farthest: f64 = 0.0;
         while let Some(parent) = tree.nodes[node].parent {
@@ -414,13 +413,7 @@ mod tests {
                 if i == 60 { Some(19) } else { i.checked_sub(1) }
             },
         );
-        let tree = colonise(
-            &middles,
-            &points,
-            Point3::origin(),
-            1.0,
-            &Colonisation::ALONG_WOOD,
-        );
+        let tree = grown_along(&middles, &points);
         assert!(tree.of_point.iter().all(|node| *node != u32::MAX));
     }
 
@@ -431,13 +424,7 @@ mod tests {
             .map(|i| Point3::new(0.0, 0.0, if i < 40 { i as f32 } else { 60.0 + i as f32 }))
             .collect();
         let middles = middles_at(&row, |i| i.checked_sub(1));
-        let tree = colonise(
-            &middles,
-            &row,
-            Point3::origin(),
-            1.0,
-            &Colonisation::ALONG_WOOD,
-        );
+        let tree = grown_along(&middles, &row);
         let tip = tree.nodes.iter().map(|n| n.at.z).fold(0.0, f64::max);
         assert!((155.0..162.0).contains(&tip), "{tip}");
         assert_eq!(tree.of_point.len(), row.len());

@@ -413,8 +413,8 @@ mod tests {
         assert!(by_lines(&[], &scan()).is_none());
     }
 
-    #[test]
-    fn the_pair_that_does_not_fit_the_others_is_named() {
+    /// Places on a tree that is filmed from 1.1 radians, as they are in the film.
+    fn exact_pairs() -> Vec<PlacePair> {
         let truth = Similarity2::new(Vector2::new(30.0, -40.0), -0.05, 80.0);
         let places = [
             [0.0, 0.0, 0.0],
@@ -431,6 +431,12 @@ mod tests {
                 scan: at,
             });
         }
+        pairs
+    }
+
+    #[test]
+    fn the_pair_that_does_not_fit_the_others_is_named() {
+        let mut pairs = exact_pairs();
         assert_eq!(odd_pair(&pairs, 400.0), None);
         pairs[3].film_px.x += 60.0;
         assert_eq!(odd_pair(&pairs, 400.0), Some(3));
@@ -441,19 +447,8 @@ mod tests {
 
     #[test]
     fn three_pairs_give_it_and_pairs_that_disagree_do_not() {
-        let truth = Similarity2::new(Vector2::new(30.0, -40.0), -0.05, 80.0);
-        let places = [
-            [0.0, 0.0, 0.0],
-            [1.0, 0.5, 3.0],
-            [-0.7, 1.0, 4.0],
-            [0.4, -1.5, 3.5],
-        ]
-        .map(Point3::from);
-        let pair = |at: Point3<f64>| PlacePair {
-            film_px: truth * turned(&at, 1.1),
-            scan: at,
-        };
-        let mut pairs = places.map(pair);
+        let mut pairs = exact_pairs();
+        pairs.truncate(4);
         let found = by_pairs(&pairs[..3], 320.0).expect("found");
         assert!(found.holds());
         let four = by_pairs(&pairs, 320.0).expect("found");

@@ -5,6 +5,7 @@
 use super::{DepthReader, Pixel};
 use crate::config;
 use crate::model::{DEPTH_APART_S, DepthImage, LONGEST_LAG_S, Size, TrackId, TrackSet};
+use crate::signal::vectors::keep_every_other;
 use nalgebra::{Point2, Vector2};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -188,9 +189,10 @@ impl LagMeter {
                 picture,
             });
         }
-        while let Some(second) = self.next_pair() {
-            self.compare(&second);
-            self.waiting.pop_front();
+        while let Some(second) = self.next_pair()
+            && let Some(first) = self.waiting.pop_front()
+        {
+            self.compare(&first, &second);
         }
         self.forget();
     }
@@ -219,11 +221,8 @@ impl LagMeter {
         }
     }
 
-    /// Compares the first image that waits with a later one, at all lags.
-    fn compare(&mut self, second: &Waiting) {
-        let Some(first) = self.waiting.front().cloned() else {
-            return;
-        };
+    /// Compares an image with a later one, at all lags.
+    fn compare(&mut self, first: &Waiting, second: &Waiting) {
         let begun_s = *self.begun_s.get_or_insert(first.time_s);
         if first.time_s - begun_s >= BLOCK_S {
             self.end_block(0.5 * (begun_s + first.time_s));
@@ -234,7 +233,7 @@ impl LagMeter {
             let then = self.moment(first.time_s - lag_s(k));
             let later = self.moment(second.time_s - lag_s(k));
             if let (Some(then), Some(later)) = (then, later) {
-                self.compare_at(k, (&first, &then), (second, &later), &mut halves);
+                self.compare_at(k, (first, &then), (second, &later), &mut halves);
             }
         }
         self.halves = halves;
@@ -321,11 +320,7 @@ impl LagMeter {
             self.blocks.push(Block { middle_s, late_s });
         }
         if self.blocks.len() > MOST_BLOCKS {
-            let mut is_kept = false;
-            self.blocks.retain(|_| {
-                is_kept = !is_kept;
-                is_kept
-            });
+            keep_every_other(&mut self.blocks);
         }
     }
 

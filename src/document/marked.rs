@@ -99,8 +99,8 @@ impl Document {
 
     /// The tree of the markers in the last `window_s` seconds of what lies between two times, s. Who is
     /// whose parent follows from `parents`, which are of the same names and leave out who is not among them; without
-    /// them from what the capture was given; and where that says nothing, from the motion: a marker's parent is the next one
-    /// towards the foot on the branches of the tree of all points, on which it lies in the picture.
+    /// them from what the capture was given; and where that says nothing, from the motion: a marker's parent is the
+    /// next one towards the foot on the branches of the tree of all points, on which it lies in the picture.
     ///
     /// # Errors
     /// The capture has no markers, or none was seen, `parents` are of others, or `tracks.csv` is missing
@@ -231,15 +231,18 @@ impl Document {
 }
 
 impl MarkedTree {
+    /// The marker in which the branch ends that ends in a node.
+    fn name_at(&self, node: NodeId) -> Option<&String> {
+        self.names.get(&self.skeleton.nodes[node.index()].name)
+    }
+
     /// The markers that were seen in less than this share of the frames, by name, each with how many.
     pub fn seldom_seen(&self, share: f64) -> Vec<SeldomSeen> {
         let frames = self.film.times_s.len();
         let mut seldom = Vec::new();
         for track in &self.film.tracks {
             let seen = track.at_px.iter().filter(|at| at.x.is_finite()).count();
-            let name = self
-                .names
-                .get(&self.skeleton.nodes[track.node.index()].name);
+            let name = self.name_at(track.node);
             if let Some(name) = name.filter(|_| (seen as f64) < share * frames as f64) {
                 seldom.push(SeldomSeen {
                     name: name.clone(),
@@ -257,9 +260,7 @@ impl MarkedTree {
         let usual_px = median(all_px.clone(), f64::total_cmp).unwrap_or(0.0);
         let mut still = Vec::new();
         for (track, moves_px) in self.film.tracks.iter().zip(all_px) {
-            let name = self
-                .names
-                .get(&self.skeleton.nodes[track.node.index()].name);
+            let name = self.name_at(track.node);
             if let Some(name) = name.filter(|_| moves_px < share * usual_px) {
                 still.push(StillMarker {
                     name: name.clone(),

@@ -245,11 +245,7 @@ mod tests {
 
     #[test]
     fn what_was_not_measured_is_missing_and_not_near() {
-        let image = DepthImage {
-            size: Size::new(2, 2),
-            counts: vec![0, 900, u16::MAX, 7],
-            later_s: 0.0,
-        };
+        let image = DepthImage::new(Size::new(2, 2), vec![0, 900, u16::MAX, 7]);
         let at = |u, v| image.count(u, v);
         assert_eq!(
             [at(0, 0), at(1, 0), at(0, 1), at(1, 1)],

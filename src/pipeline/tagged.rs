@@ -3,6 +3,7 @@
 use crate::config::{self, Config};
 use crate::depth;
 use crate::model::{Frame, Size, TagScale};
+use crate::signal::vectors::keep_every_other;
 use crate::tag::{Tag, TagCamera, TagSeen, find_tags, scale_of};
 
 /// The scale is fixed after so many sights, in one of so many frames; from then on the tag is looked at in
@@ -111,11 +112,7 @@ impl TagStage {
         self.times_seen += usize::from(seen.is_some());
         self.sights.extend(seen);
         if self.sights.len() > MAX_SIGHTS {
-            let mut is_odd = false;
-            self.sights.retain(|_| {
-                is_odd = !is_odd;
-                is_odd
-            });
+            keep_every_other(&mut self.sights);
         }
     }
 

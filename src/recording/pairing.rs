@@ -177,11 +177,7 @@ mod tests {
     }
 
     fn depth(count: u16) -> Arc<DepthImage> {
-        Arc::new(DepthImage {
-            size: Size::new(1, 1),
-            counts: vec![count],
-            later_s: 0.0,
-        })
+        Arc::new(DepthImage::new(Size::new(1, 1), vec![count]))
     }
 
     fn of(picture: Option<Picture>) -> Option<u16> {

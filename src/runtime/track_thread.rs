@@ -315,8 +315,10 @@ impl<'a> TrackThread<'a> {
 
     /// Says once that depth images are of another moment than their pictures.
     fn report_depth_lag(&mut self) {
-        let lag = self.front.depth_lag().filter(|_| !self.is_lag_said);
-        if let Some(line) = lag.as_ref().and_then(lag_line) {
+        if self.is_lag_said {
+            return;
+        }
+        if let Some(line) = self.front.depth_lag().as_ref().and_then(lag_line) {
             self.is_lag_said = true;
             self.shared.warn(line);
         }

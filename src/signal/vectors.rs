@@ -34,6 +34,15 @@ pub fn subtract_scaled(a: &mut [f64], factor: f64, b: &[f64]) {
     }
 }
 
+/// Keeps the first of a list, and every other one after it.
+pub fn keep_every_other<T>(list: &mut Vec<T>) {
+    let mut is_kept = false;
+    list.retain(|_| {
+        is_kept = !is_kept;
+        is_kept
+    });
+}
+
 /// The same columns, borrowed.
 pub fn slices(columns: &[Vec<f64>]) -> Vec<&[f64]> {
     columns.iter().map(Vec::as_slice).collect()

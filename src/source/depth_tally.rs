@@ -100,11 +100,8 @@ mod tests {
         let mut stops = DepthTally::default();
         let mut gaps = DepthTally::default();
         let mut empty = DepthTally::default();
-        let [sound, holes] = [[0, 2000], [0, 0]].map(|counts| DepthImage {
-            size: Size::new(2, 1),
-            counts: counts.to_vec(),
-            later_s: 0.0,
-        });
+        let [sound, holes] =
+            [[0, 2000], [0, 0]].map(|counts| DepthImage::new(Size::new(2, 1), counts.to_vec()));
         for k in 0..90 {
             let time_s = 50.0 + f64::from(k) / 30.0;
             whole.frame(time_s, (k != 7).then_some(&sound));

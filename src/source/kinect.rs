@@ -21,10 +21,8 @@ use std::sync::Arc;
 
 /// Metres for each count.
 const UNIT_M: f64 = 0.001;
-/// So many pictures wait for a depth image: which is the nearest to it shows with the next one. More do where depth is
-/// late: those of its lateness at the camera's highest rate, Hz.
+/// So many pictures wait for a depth image: which is the nearest to it shows with the next one.
 const WAITING: u64 = 2;
-const HIGHEST_RATE_HZ: f64 = 30.0;
 /// The attachment with the calibration.
 const CALIBRATION: &str = "calibration.json";
 
@@ -112,8 +110,6 @@ pub(super) struct Kinect {
     pairing: Pairing<RawFrame>,
     /// Pictures that wait.
     waiting: u64,
-    /// So many do before one is given out.
-    must_wait: u64,
     colour_ended: bool,
     depth_ended: bool,
     tally: DepthTally,
@@ -138,7 +134,6 @@ impl Kinect {
             colour,
             depth: VideoPipe::start(path, "ffmpeg", &stream, PixelFormat::DEPTH[0])?,
             pairing: Pairing::in_turns(known.format.late_s),
-            must_wait: WAITING + (known.format.late_s.max(0.0) * HIGHEST_RATE_HZ).ceil() as u64,
             known,
             waiting: 0,
             colour_ended: false,
@@ -149,7 +144,7 @@ impl Kinect {
 
     /// Reads one image more: pictures until some wait, then depth.
     fn read_on(&mut self) -> Result<(), SourceError> {
-        if !self.colour_ended && self.waiting < self.must_wait {
+        if !self.colour_ended && self.waiting < WAITING {
             match self.colour.next_frame()? {
                 Some(frame) => {
                     self.waiting += 1;
@@ -177,7 +172,7 @@ impl Kinect {
 
     /// The oldest picture, if nothing more has to be read for it.
     fn ready(&mut self) -> Option<RawFrame> {
-        let is_known = self.colour_ended || self.waiting >= self.must_wait;
+        let is_known = self.colour_ended || self.waiting >= WAITING;
         match is_known {
             true if self.depth_ended => self.pairing.oldest(),
             true => self.pairing.ready(),

@@ -268,11 +268,10 @@ pub(super) fn depth_of_png(bytes: &[u8]) -> Result<DepthImage, String> {
         .decode()
         .map_err(|_| "it is no readable PNG".to_owned())?;
     match image {
-        image::DynamicImage::ImageLuma16(image) => Ok(DepthImage {
-            size: Size::new(image.width(), image.height()),
-            counts: image.into_raw(),
-            later_s: 0.0,
-        }),
+        image::DynamicImage::ImageLuma16(image) => Ok(DepthImage::new(
+            Size::new(image.width(), image.height()),
+            image.into_raw(),
+        )),
         image::DynamicImage::ImageLuma8(_) => {
             Err("it has 8 bits of grey, and depth is a PNG with 16 bits of grey".to_owned())
         }

@@ -79,11 +79,7 @@ fn our_own_depth_comes_back_to_the_byte() {
         let counts = (0..SMALL.area())
             .map(|i| (i as u64 * 3001 * n) as u16)
             .collect();
-        let depth = DepthImage {
-            size: SMALL,
-            counts,
-            later_s: 0.0,
-        };
+        let depth = DepthImage::new(SMALL, counts);
         frames.push(RawFrame {
             sequence: Some(n),
             sensor_time_s: seconds(-1_000_000_000 + n as i64 * 33_366_667),

@@ -65,11 +65,7 @@ fn picture(k: u64) -> RawFrame {
 
 /// The depth image of picture `k`, some milliseconds later.
 fn depth(k: u64) -> RawFrame {
-    let image = DepthImage {
-        size: SIZE,
-        counts: vec![1 + k as u16; 4],
-        later_s: 0.0,
-    };
+    let image = DepthImage::new(SIZE, vec![1 + k as u16; 4]);
     RawFrame {
         sensor_time_s: picture(k).sensor_time_s + 0.004,
         format: PixelFormat::Z16,
